@@ -32,6 +32,9 @@ READERS: dict[str, Callable[..., Any]] = {
     "csv": pdmp.io.read_csv,
     "bvh": pdmp.io.read_bvh,
     "npz": pdmp.io.read_npz,
+    "opensim": pdmp.io.read_opensim,
+    "c3d": pdmp.io.read_c3d,
+    "mat": pdmp.io.read_mat,
 }
 REFUSALS = (ValueError, OSError)
 MAX_SIZE = 1 << 14  # bytes of a changed file; larger ones only take longer
@@ -73,6 +76,12 @@ TOKENS: dict[str, list[str]] = {
         "99999999999999999999", "\n", "\t", "\x00", "\ufeff",
     ],
     "npz": [],
+    "opensim": [
+        "\t", "\n", " ", "PathFileType", "NumFrames", "Frame#", "Time", "time", "endheader",
+        "nRows=", "inDegrees=yes", "nan", "-1", "99999999999999999999", "\x00", "\ufeff",
+    ],
+    "c3d": [],
+    "mat": [],
 }
 NUMBERS = [
     "0", "-0", "1", "-1", "2", "1e-9", "1e9", "1e308", "1e-320", "nan", "inf", "1.5.2",
@@ -99,7 +108,7 @@ def check(target: str, path: Path) -> None:
                 found = READERS[target](path, **options)
             except REFUSALS:
                 continue
-        for demo in found.values() if target == "npz" else [found]:
+        for demo in found.values() if isinstance(found, dict) else [found]:
             assert np.isfinite(demo.position).all(), "a position is not finite"
             clock = [0.0, demo.dt or 1.0] if demo.time is None else demo.time
             assert np.isfinite(clock).all() and (np.diff(clock) > 0).all(), "time does not increase"
@@ -123,7 +132,9 @@ def seeds(target: str) -> list[bytes]:
             _archive({"time": t, "position": y}),
         ],
     }
-    return made[target] + [path.read_bytes() for path in sorted((CORPUS / target).glob("*"))]
+    return made.get(target, []) + [
+        path.read_bytes() for path in sorted((CORPUS / target).glob("*"))
+    ]
 
 
 def _archive(arrays: dict[str, Any]) -> bytes:

@@ -13,7 +13,7 @@ from pdmp.cli import main
 from pdmp.evaluation import PDMP, baselines
 from synthetic import DT, loops, reaches
 
-COMMANDS = ["fit", "rollout", "evaluate", "info", "plot", "explore"]
+COMMANDS = ["fit", "cycles", "rollout", "evaluate", "info", "plot", "explore"]
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ import pickle
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 
 import pdmp
@@ -153,3 +154,47 @@ def test_conditions_of_the_other_kind_are_rejected_everywhere() -> None:
     for call in (model.rollout, model.controller, model.controller(0.01).reset):
         with pytest.raises(ValueError, match="goal_velocity"):
             call(goal_velocity=[0.0, 0.0])
+
+
+@pytest.mark.parametrize("kind", ["series", "dict"])
+def test_named_elements_of_a_condition_are_put_into_the_order_of_the_model(kind: str) -> None:
+    """A row of a data frame or a mapping has any order; other names are refused."""
+    demos = [pdmp.Demonstration(demo.position, dt=demo.dt, names=["x", "y"]) for demo in reaches()]
+    model = pdmp.fit(demos)
+    make = pandas.Series if kind == "series" else dict
+    expected = model.rollout(goal=[1.1, 0.2], start=[0.1, 0.0], velocity=[0.0, 0.3])
+    named = {
+        "goal": make({"y": 0.2, "x": 1.1}),
+        "start": make({"x": 0.1, "y": 0.0}),
+        "velocity": make({"y": 0.3, "x": 0.0}),
+    }
+    np.testing.assert_array_equal(model.rollout(**named).position, expected.position)
+    controller = model.controller(0.01, goal=make({"y": 0.2, "x": 1.1}))
+    np.testing.assert_array_equal(controller.goal, [1.1, 0.2])
+    with pytest.raises(ValueError, match="goal has elements z, y, expected one for each of x, y"):
+        model.rollout(goal=make({"z": 0.2, "y": 1.1}))
+    with pytest.raises(ValueError, match="goal has elements y, expected one for each of x, y"):
+        model.rollout(goal=make({"y": 0.2}))
+
+
+def test_names_are_followed_wherever_conditions_meet_a_model() -> None:
+    """Commands, batches and goals of demonstrations too; conditions by themselves refuse names."""
+    demos = [
+        pdmp.Demonstration(
+            demo.position, dt=demo.dt, names=["x", "y"], goal=pandas.Series({"y": 0.5, "x": 1.0})
+        )
+        for demo in reaches()
+    ]
+    np.testing.assert_array_equal(demos[0].goal, [1.0, 0.5])
+    model = pdmp.fit(demos)
+    controller = model.controller(0.01)
+    controller.goal = pandas.Series({"y": 0.2, "x": 1.1})
+    np.testing.assert_array_equal(controller.goal, [1.1, 0.2])
+    goals = pandas.DataFrame({"y": [0.1, 0.2], "x": [0.9, 1.1]})
+    batch = model.rollouts(goal=goals, dt=0.01)[0]
+    expected = model.rollout(goal=[1.1, 0.2], dt=0.01).position
+    np.testing.assert_allclose(batch[1], expected, atol=1e-12)
+    with pytest.raises(ValueError, match="goal has names, which conditions alone cannot"):
+        pdmp.Conditions(goal=goals.iloc[0])
+    unnamed = model.rollout(goal=pandas.Series([1.1, 0.2]), dt=0.01).position
+    np.testing.assert_array_equal(unnamed, expected)

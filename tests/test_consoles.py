@@ -148,20 +148,14 @@ def test_info_prints_names_and_labels_in_one_line(
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["fit", "-", "-o", "m"],
-        ["fit", "a.csv", "-o", "-"],
-        ["rollout", "-", "-o", "a.csv"],
-        ["rollout", "m", "-o", "-"],
-        ["evaluate", "-"],
-        ["info", "-"],
-        ["plot", "-", "-o", "figures"],
-        ["plot", "m", "-", "-o", "figures"],
+        ["plot", "m", "-o", "-"],
+        ["evaluate", "a", "-o", "-"],
     ],
 )
-def test_a_dash_is_rejected_as_a_file(
+def test_a_dash_is_rejected_as_a_folder(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The path - is rejected: it is neither a stream nor a file."""
+    """The path - is rejected for figures: it is a stream, not a folder."""
     with pytest.raises(SystemExit, match="2"):
         main(arguments)
     assert "- is not a file: name one, or write ./-" in capsys.readouterr().err

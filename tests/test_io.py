@@ -308,7 +308,7 @@ def test_read_takes_files_and_folders_together(folder: Path) -> None:
 
 def test_read_rejects_unknown_formats(tmp_path: Path) -> None:
     """Another suffix is rejected with the supported ones."""
-    with pytest.raises(ValueError, match=r"expected a \.csv, \.bvh or \.npz file or a folder"):
+    with pytest.raises(ValueError, match=r"expected a folder or a file of one of \.csv"):
         pdmp.io.read([tmp_path / "demo.txt"])
 
 
@@ -520,6 +520,17 @@ def test_bvh_gives_every_channel_unwrapped(bvh: Path) -> None:
     np.testing.assert_array_equal(demo.position[:, 1], [90, 91, 92, 93])
     np.testing.assert_allclose(np.rad2deg(demo.position[:, 8]), [-170, -180, -190, -200])
     assert demo.units == [""] * 3 + ["rad"] * 3 + [""] + ["rad"] * 3
+
+
+def test_bvh_angles_have_no_jumps_by_full_turns(bvh: Path) -> None:
+    """Programs write angles within a turn; the movement goes on beyond it."""
+    text = BVH
+    for angle in (-190, -200):
+        text = text.replace(str(angle), str(angle + 360))
+    assert text != BVH
+    bvh.write_text(text)
+    demo = pdmp.io.read_bvh(bvh)
+    np.testing.assert_allclose(np.rad2deg(demo.position[:, 8]), [-170, -180, -190, -200])
 
 
 def test_bvh_is_read_like_csv(bvh: Path) -> None:

@@ -4,6 +4,7 @@ import pickle
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -243,3 +244,33 @@ def test_a_recording_needs_a_clock() -> None:
     for call in (pdmp.preprocessing.period, pdmp.preprocessing.trim, pdmp.preprocessing.cycles):
         with pytest.raises(ValueError, match=r"time is unknown: .*dt= or time="):
             call(bare)
+
+
+def test_cycles_are_fitted_as_a_rhythm_without_the_kind() -> None:
+    """The kind of a fit to cycles is rhythmic by default, and can be given."""
+    time = 0.01 * np.arange(800)
+    walk = np.column_stack([np.cos(5.7 * time), np.sin(5.7 * time + 0.3 * np.cos(5.7 * time))])
+    cycles = pdmp.preprocessing.cycles(pdmp.Demonstration(walk, dt=0.01))
+    assert pdmp.fit(cycles).kind == pdmp.fit(cycles, kind="rhythmic").kind == "rhythmic"
+    assert pdmp.fit(list(cycles)).kind == pdmp.fit(cycles, kind="discrete").kind == "discrete"
+
+
+def test_cycles_have_the_named_contexts_of_their_recordings() -> None:
+    """Each cycle has the values of its recording, under the names that a reader found."""
+    time = 0.01 * np.arange(800)
+    walks = {
+        speed: np.column_stack([speed * np.cos(5.7 * time), np.sin(5.7 * time)])
+        for speed in (0.8, 1.2)
+    }
+    frames = [
+        pandas.DataFrame(
+            {"trial": f"{speed}", "t": time, "x": walk[:, 0], "y": walk[:, 1], "speed": speed}
+        )
+        for speed, walk in walks.items()
+    ]
+    demos = pdmp.io.from_dataframe(pandas.concat(frames), by="trial", context=["speed"])
+    trimmed = pdmp.preprocessing.trim(demos)
+    assert trimmed.contexts == demos.contexts == {"speed": [0.8, 1.2]}
+    cycles = pdmp.preprocessing.cycles(demos)
+    assert cycles.contexts == {"speed": [(0.8, 1.2)[k] for k in cycles.recordings]}
+    assert pdmp.fit(cycles).context_names == ["speed"]

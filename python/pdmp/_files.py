@@ -3,6 +3,7 @@
 import errno
 import os
 import shutil
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -44,3 +45,17 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
     finally:
         draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """Yields a temporary folder, in which the block makes the folder `path.name` that is kept.
+
+    The folder of `path` must exist, and `path` must not. After an error nothing remains.
+    """
+    check_folder(path)
+    if path.exists():
+        raise FileExistsError(errno.EEXIST, "exists; name a new folder", str(path))
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".pdmp-") as draft:
+        yield Path(draft)
+        os.replace(Path(draft) / path.name, path)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pdmp._messages import quoted, value_error
+from pdmp._messages import quoted, value_error, warn
 
 if TYPE_CHECKING:
     from pdmp._native import Trajectory
@@ -16,11 +16,27 @@ ROTATION_DOF = "_rot"
 DERIVATIVES = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
 """Suffixes of name and unit in the columns of position, velocity and acceleration."""
 
+CLOCK = re.compile(
+    r"t|(time([ _]?stamps?)?|timestamps?|stamps?|seconds?|secs?|elapsed([ _]time)?)", re.IGNORECASE
+)
+"""Names of a column of time stamps, without its unit."""
+CLOCK_UNIT = re.compile(r"[ _](s|sec|seconds?|ms|us|µs|ns)$")
+"""Unit at the end of such a name."""
+
 
 def split_label(field: str) -> tuple[str, str]:
     """Returns name and unit of a header field such as `knee [rad]`; the unit is "" without one."""
     match = re.fullmatch(r"(.*\S)\s*\[([^][]*)\]", field.strip(), re.DOTALL)
     return (match[1], match[2].strip()) if match else (field.strip(), "")
+
+
+def clock_unit(name: str) -> str | None:
+    """Returns the unit in the name of a column of time stamps, or None for another column."""
+    name, unit = split_label(re.sub(r"\((.*)\)$", r"[\1]", name))
+    if not unit and (match := CLOCK_UNIT.search(name)):
+        name, unit = name[: match.start()], match[1]
+    # An upper-case T is a temperature or a torque.
+    return unit if name != "T" and CLOCK.fullmatch(name) else None
 
 
 def join_label(name: str, unit: str) -> str:
@@ -39,6 +55,17 @@ def name_list(argument: str, names: Sequence[str]) -> list[str]:
 
 
 def names_and_units(value: Any) -> tuple[list[str] | None, list[str] | None]:
+    """Returns names and units of positions; warns of a column that is probably the time."""
+    names, units = column_labels(value)
+    if times := [name for name in names or [] if clock_unit(name) is not None]:
+        warn(
+            f"the column '{times[0]}' of a data frame becomes a degree of freedom here: "
+            "pdmp.io.from_dataframe reads it as the time"
+        )
+    return names, units
+
+
+def column_labels(value: Any) -> tuple[list[str] | None, list[str] | None]:
     """Returns names and units of the degrees of freedom, or None.
 
     Names are the columns of a data frame, or the coordinate along the last axis of a labelled

@@ -16,6 +16,7 @@ from pdmp.explorer import Explorer
 _Array: TypeAlias = NDArray[np.float64]
 _Kind: TypeAlias = Literal["discrete", "rhythmic"]
 _Map: TypeAlias = Literal["auto", "stacked", "gp", "linear", "polynomial"]
+_Vector: TypeAlias = ArrayLike | Mapping[str, float]
 _Context: TypeAlias = ArrayLike | Sequence[float | str] | Mapping[str, float | str]
 _Contexts: TypeAlias = (
     ArrayLike
@@ -205,15 +206,15 @@ def fit(
         Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
         readers return, the values are used. The columns of data frames name the degrees of freedom.
     kind : {"discrete", "rhythmic"}
-        Movement from a start to a goal, or around an anchor.
+        Movement from a start to a goal, or around an anchor, the default for the result of `preprocessing.cycles`.
     dt : float, optional
         Sampling interval in s of demonstrations without one.
     period : float or array_like, (M,), optional
         Periods in s of time-stamped cycles.
     contexts : array_like, (M, Q) or (M,), or M lists of Q numbers and labels, or mapping, optional
-        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
-        keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
-        (M,).
+        Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry, with
+        the names that readers of `pdmp.io` found. The model keeps the names of the columns of a data frame, of
+        records, of M mappings, or of a mapping from names to columns (M,).
     map : {"auto", "stacked", "gp", "linear", "polynomial"}
         Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
         regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
@@ -819,7 +820,8 @@ class Model:
         context : array_like or list, (Q,), optional
             Context whose prediction supplies absent conditions: style, goal, start or anchor, and duration.
         **changes
-            Single conditions by name, which replace those of `conditions`; see `Conditions`.
+            Single conditions by name, which replace those of `conditions`; see `Conditions`. A mapping or a row of a data
+            frame whose elements have the names of the degrees of freedom may have them in any order.
 
         Returns
         -------
@@ -1611,11 +1613,11 @@ class Factors:
 
 class _Changes(TypedDict, total=False):
     style: ArrayLike | None  # (J,)
-    goal: ArrayLike | None  # (D,), as are start, both velocities and anchor
-    start: ArrayLike | None
-    velocity: ArrayLike | None
-    goal_velocity: ArrayLike | None
-    anchor: ArrayLike | None
+    goal: _Vector | None  # (D,), as are start, both velocities and anchor
+    start: _Vector | None
+    velocity: _Vector | None
+    goal_velocity: _Vector | None
+    anchor: _Vector | None
     amplitude: float | None
     tau: float | None
     segment_durations: ArrayLike | None  # (K,)

@@ -23,7 +23,7 @@ pub(crate) fn batch_conditions_of(
     context: Option<&Bound<'_, PyAny>>,
     changes: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<BatchConditions> {
-    let (common, rows) = split(py, changes)?;
+    let (common, rows) = split(py, crate::labelled::in_order(model, changes)?.as_ref())?;
     let (mut bases, mut is_list) = match conditions {
         None => (vec![Inner::default()], false),
         Some(list) if !list.is_instance_of::<Conditions>() && list.try_iter().is_ok() => {

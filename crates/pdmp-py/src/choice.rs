@@ -18,9 +18,14 @@ impl<'py> FromPyObject<'_, 'py> for Choice<'py> {
     }
 }
 
-impl Choice<'_> {
+impl<'py> Choice<'py> {
     /// Value of an argument that is absent: the first choice.
     pub(crate) const FIRST: Self = Self(None);
+
+    /// Returns the argument, or the text `other` if it is absent.
+    pub(crate) fn or(self, other: Option<Bound<'py, PyAny>>) -> Self {
+        Self(self.0.or(other))
+    }
 
     /// Returns the value of the chosen text, or that of the first choice if the argument is absent.
     pub(crate) fn of<T: Copy>(self, name: &str, choices: &[(&str, T)]) -> PyResult<T> {

@@ -77,6 +77,7 @@ impl Conditions {
                           tau=None, segment_durations=None, phase=None)"
     )]
     fn new(conditions: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        crate::labelled::reject(conditions)?;
         changed(Inner::default(), conditions).map(Self)
     }
 
@@ -98,6 +99,7 @@ impl Conditions {
     ///     As for `Conditions`.
     #[pyo3(signature = (**changes))]
     fn replace(&self, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        crate::labelled::reject(changes)?;
         changed(self.0.clone(), changes).map(Self)
     }
 
@@ -226,7 +228,7 @@ pub(crate) fn predicted_conditions_of(
         None => Inner::default(),
         Some(object) => instance::conditions("conditions", object)?.clone(),
     };
-    let own = changed(base, changes)?;
+    let own = changed(base, crate::labelled::in_order(model, changes)?.as_ref())?;
     let Some(context) = context else { return Ok((own, None)) };
     reject_style(own.style.is_some())?;
     let prediction = model.predict(&crate::named_contexts::context_for(model, context)?).map_err(raise)?;

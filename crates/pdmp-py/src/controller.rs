@@ -13,6 +13,7 @@ use crate::conditions::conditions_of;
 use crate::convert::{Vector, read_only, refill};
 use crate::error::raise;
 use crate::instance::pair;
+use crate::labelled::refill_in_order;
 use crate::output::Output;
 use crate::scalar::{Scalar, number, optional_number};
 use crate::status::Status;
@@ -249,7 +250,7 @@ impl Controller {
 
     #[setter]
     fn set_goal(&mut self, goal: &Bound<'_, PyAny>) -> PyResult<()> {
-        refill("goal", goal, &mut self.arguments.command)?;
+        refill_in_order("goal", self.model.coordinate_names(), goal, &mut self.arguments.command)?;
         let result = self.inner.set_goal(&self.arguments.command);
         self.command(result)
     }
@@ -280,7 +281,7 @@ impl Controller {
     #[setter]
     fn set_goal_velocity(&mut self, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         if let Some(velocity) = velocity {
-            refill("goal_velocity", velocity, &mut self.arguments.command)?;
+            refill_in_order("goal_velocity", self.model.names(), velocity, &mut self.arguments.command)?;
         }
         let result = self.inner.set_goal_velocity(velocity.map(|_| &*self.arguments.command));
         self.command(result)
@@ -294,7 +295,7 @@ impl Controller {
 
     #[setter]
     fn set_anchor(&mut self, anchor: &Bound<'_, PyAny>) -> PyResult<()> {
-        refill("anchor", anchor, &mut self.arguments.command)?;
+        refill_in_order("anchor", self.model.coordinate_names(), anchor, &mut self.arguments.command)?;
         let result = self.inner.set_anchor(&self.arguments.command);
         self.command(result)
     }

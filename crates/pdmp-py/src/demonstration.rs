@@ -96,7 +96,11 @@ impl Demonstration {
         if let Some(rotations) = rotations {
             demo = demo.with_rotations(rotations).map_err(raise)?;
         }
-        if let Some(goal) = optional("goal", goal)? {
+        let ordered = match (goal, demo.names()) {
+            (Some(goal), Some(names)) => crate::labelled::arranged("goal", names, goal)?,
+            _ => None,
+        };
+        if let Some(goal) = optional("goal", ordered.as_ref().or(goal))? {
             demo = demo.with_goal(goal).map_err(raise)?;
         }
         Ok(Self(demo))

@@ -14,7 +14,7 @@ use pdmp_core::numerics::Smoothing;
 use pdmp_core::{FitOptions, Kind};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyList, PyMapping};
+use pyo3::types::{PyBool, PyList, PyMapping, PyString};
 
 use crate::choice::Choice;
 use crate::convert::{items, matrix, numbers, quoted};
@@ -38,15 +38,15 @@ use crate::warp::TimeWarp;
 ///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
 ///     readers return, the values are used. The columns of data frames name the degrees of freedom.
 /// kind : {"discrete", "rhythmic"}
-///     Movement from a start to a goal, or around an anchor.
+///     Movement from a start to a goal, or around an anchor, the default for the result of `preprocessing.cycles`.
 /// dt : float, optional
 ///     Sampling interval in s of demonstrations without one.
 /// period : float or array_like, (M,), optional
 ///     Periods in s of time-stamped cycles.
 /// contexts : array_like, (M, Q) or (M,), or M lists of Q numbers and labels, or mapping, optional
-///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry. The model
-///     keeps the names of the columns of a data frame, of records, of M mappings, or of a mapping from names to columns
-///     (M,).
+///     Contexts of the demonstrations, numbers in any unit; by default those that the demonstrations carry, with
+///     the names that readers of `pdmp.io` found. The model keeps the names of the columns of a data frame, of
+///     records, of M mappings, or of a mapping from names to columns (M,).
 /// map : {"auto", "stacked", "gp", "linear", "polynomial"}
 ///     Map from contexts to style, goal, start and duration. "stacked" weights a Gaussian process and a ridge
 ///     regression by their leave-one-out errors, and the mean too outside the range of the contexts; "gp" is the
@@ -190,6 +190,9 @@ pub(crate) fn fit(
     threads: Option<Scalar<'_>>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Model> {
+    let kind = kind.or(crate::labelled::attribute::<PyString>(demos, "kind"));
+    let own_contexts = crate::labelled::attribute::<PyMapping>(demos, "contexts");
+    let contexts = contexts.or(own_contexts.as_ref());
     let demos = demonstrations("demos", demos)?;
     let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
     let rhythmic = (optional_number("mu", mu)?, period);

@@ -18,6 +18,7 @@ mod feasibility;
 mod fit;
 mod inspection;
 mod instance;
+mod labelled;
 mod limits;
 mod model;
 mod model_getters;

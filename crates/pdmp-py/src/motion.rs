@@ -37,7 +37,8 @@ impl Model {
     /// context : array_like or list, (Q,), optional
     ///     Context whose prediction supplies absent conditions: style, goal, start or anchor, and duration.
     /// **changes
-    ///     Single conditions by name, which replace those of `conditions`; see `Conditions`.
+    ///     Single conditions by name, which replace those of `conditions`; see `Conditions`. A mapping or a row of a data
+    ///     frame whose elements have the names of the degrees of freedom may have them in any order.
     ///
     /// Returns
     /// -------

@@ -14,6 +14,10 @@ from pdmp._messages import printable
 _RENAMED = {"contexts": "context", "demos": "demo", "n_styles": "styles"}
 
 
+aliases: dict[str, str] = {}
+"""Names in messages of temporary files."""
+
+
 def option_names(parser: ArgumentParser) -> dict[str, str]:
     """Returns the options of a command by the names of the Python arguments that they set."""
     options = {
@@ -43,6 +47,8 @@ def one_line(message: object, options: Mapping[str, str]) -> str:
     dt = 0: must be positive", or recommends one, as in "pass dt=" or "set goal".
     """
     text = printable(" ".join(str(message).split()))
+    for path, name in aliases.items():
+        text = text.replace(path, name)
     if not options:
         return text
     name = "|".join(sorted(options, key=len, reverse=True))

@@ -9,26 +9,28 @@ from argparse import ArgumentParser, Namespace
 
 from pdmp._files import atomic_write
 from pdmp.cli.console import report, say
+from pdmp.cli.formats import FORMATS
 from pdmp.cli.options import (
     add_fit_options,
     add_output,
     add_reader_options,
-    file_path,
+    add_recordings,
     fit_arguments,
     made_folder,
+    period_argument,
     reader_arguments,
 )
 from pdmp.cli.progress import progress
+from pdmp.cli.streams import inputs
 from pdmp.io import read
 
+EPILOG = FORMATS
 MAX_STYLES = 8  # in the figure of E over J
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
-    parser.add_argument(
-        "paths", nargs="+", type=file_path, metavar="PATH", help="folder with an index.csv"
-    )
+    add_recordings(parser)
     add_output(parser, "FOLDER", "folder for figures and tables, created if missing")
     add_reader_options(parser)
     add_fit_options(parser)
@@ -40,9 +42,10 @@ def run(options: Namespace) -> None:
     from pdmp.evaluation import PDMP, baselines, evaluate, over_styles
 
     folder = made_folder(options.output) if options.output else None
-    recordings = read(options.paths, context=options.context, **reader_arguments(options))
+    with inputs(options.paths) as paths:
+        recordings = read(paths, context=options.context, **reader_arguments(options))
     settings = fit_arguments(options)
-    data = {"kind": options.kind, "period": options.period}
+    data = {"kind": options.kind, "period": period_argument(options)}
     with progress() as show:
         predictors = baselines() | {"PDMP": PDMP(**settings)}
         result = evaluate(recordings, predictors=predictors, **data, progress=show)

@@ -13,6 +13,7 @@ from pdmp._labels import join_label
 from pdmp._messages import printable
 from pdmp.cli.console import say
 from pdmp.cli.options import add_model
+from pdmp.cli.streams import inputs
 
 MAX_VALUES = 40  # singular values to print
 
@@ -24,7 +25,8 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Loads a model and prints its description."""
-    model = pdmp.load(options.model)
+    with inputs([options.model]) as (path,):
+        model = pdmp.load(path)
     constants = f"alpha_z {model.alpha_z:g}, beta_z {model.beta_z:g}"
     if model.alpha_x is not None:
         constants += f", alpha_x {model.alpha_x:g}"
@@ -51,7 +53,9 @@ def run(options: Namespace) -> None:
         lines["segments"] = f"{len(model.breaks) - 1}"
     if model.contexts is not None:
         columns = zip(*model.contexts, strict=True)
-        lines["contexts"] = ", ".join(_extent(column) for column in columns)
+        names = model.context_names or [""] * len(model.contexts[0])
+        extents = zip(names, map(_extent, columns), strict=True)
+        lines["contexts"] = ", ".join(f"{name} {extent}".strip() for name, extent in extents)
         lines["map"] = str(model.map)
     for name, text in lines.items():
         say(f"{name:<16}{printable(text)}")

@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 
 from pdmp._messages import printable
 from pdmp._native import PdmpError, __version__
-from pdmp.cli import evaluate, explore, fit, info, plot, rollout
+from pdmp.cli import cycles, evaluate, explore, fit, info, plot, rollout
 from pdmp.cli.console import console, one_line, option_names, short_warnings
 
 _NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 COMMANDS = {
     "fit": fit,
+    "cycles": cycles,
     "rollout": rollout,
     "evaluate": evaluate,
     "info": info,
@@ -74,6 +75,7 @@ def _parser() -> ArgumentParser:
             name,
             help=description.splitlines()[0].rstrip("."),
             description=description,
+            epilog=getattr(command, "EPILOG", None),
             formatter_class=RawDescriptionHelpFormatter,
         )
         # Before Python 3.14 argparse parses -1e-3 as an option.

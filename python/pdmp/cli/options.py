@@ -15,21 +15,33 @@ def file_path(text: str) -> str:
     return text
 
 
-def add_output(parser: ArgumentParser, metavar: str, text: str, **settings: Any) -> None:
-    """Adds the option for the file or folder to write, with further settings of the argument."""
-    parser.add_argument("-o", "--output", type=file_path, metavar=metavar, help=text, **settings)
+def stream_path(text: str) -> str:
+    """Returns the path of a file or folder, or - for standard input or output."""
+    return text
+
+
+def add_output(
+    parser: ArgumentParser, metavar: str, text: str, *, stream: bool = False, **settings: Any
+) -> None:
+    """Adds the option for the file or folder to write, with further settings of the argument.
+
+    With `stream`, the file may be standard output.
+    """
+    kind = stream_path if stream else file_path
+    parser.add_argument("-o", "--output", type=kind, metavar=metavar, help=text, **settings)
 
 
 def add_model(parser: ArgumentParser) -> None:
     """Adds the argument for the model file to read."""
-    parser.add_argument("model", type=file_path, metavar="MODEL", help="model file")
+    parser.add_argument(
+        "model", type=stream_path, metavar="MODEL", help="model file; - is standard input"
+    )
 
 
-def check_file(path: str) -> None:
-    """Raises an error before a long call if its result could not be written to this file."""
-    if Path(path).is_dir():
-        raise IsADirectoryError(f"{path}: is a folder; name a file in it")
-    check_folder(Path(path))
+def add_recordings(parser: ArgumentParser, nargs: str = "+") -> None:
+    """Adds the argument for the recordings to read."""
+    text = "files and folders of recordings, see below; - is standard input"
+    parser.add_argument("paths", type=stream_path, nargs=nargs, metavar="PATH", help=text)
 
 
 def made_folder(path: str) -> Path:
@@ -69,8 +81,8 @@ def reader_arguments(options: Namespace) -> dict[str, Any]:
     return {name: getattr(options, name) for name in ("columns", "time", "dt", "max_gap")}
 
 
-def add_fit_options(parser: ArgumentParser) -> None:
-    """Adds the options of a fit."""
+def add_fit_options(parser: ArgumentParser, *, rhythmic: bool = False) -> None:
+    """Adds the options of a fit, without those of the kind if it is `rhythmic`."""
     parser.add_argument(
         "--context", nargs="+", metavar="NAME", help="columns of index.csv that form the context"
     )
@@ -84,17 +96,25 @@ def add_fit_options(parser: ArgumentParser) -> None:
         ("alignment", ("linear", "warp"), "alignment in time with the nominal demonstration"),
         ("basis", ("gp", "ngnet"), "Gaussian process or normalised Gaussian network"),
     ):
+        if rhythmic and name == "kind":
+            parser.set_defaults(kind="rhythmic", transport=None)
+            continue
         text = f"{text}; default: %(default)s"
         parser.add_argument(f"--{name}", choices=choices, default=choices[0], help=text)
-    parser.add_argument(
-        "--transport",
-        choices=("learnt", "immediate"),
-        help="distribution of changes of start or goal in time, of discrete movements; "
-        "default: learnt",
-    )
-    parser.add_argument(
-        "--period", type=float, metavar="S", help="period of rhythmic demonstrations [s]"
-    )
+    if not rhythmic:
+        parser.add_argument(
+            "--transport",
+            choices=("learnt", "immediate"),
+            help="distribution of changes of start or goal in time, of discrete movements; "
+            "default: learnt",
+        )
+        parser.add_argument(
+            "--period",
+            type=float,
+            nargs="+",
+            metavar="S",
+            help="period of rhythmic demonstrations [s], one or one of each",
+        )
     parser.add_argument(
         "--styles",
         type=_or_named(int, "whole number", auto="auto"),
@@ -128,6 +148,12 @@ def fit_arguments(options: Namespace) -> dict[str, Any]:
         "smoothing": options.smoothing,
         "transport": options.transport,
     }
+
+
+def period_argument(options: Namespace) -> float | list[float] | None:
+    """Returns the argument `period` of `pdmp.fit`."""
+    periods: list[float] | None = options.period
+    return periods[0] if periods is not None and len(periods) == 1 else periods
 
 
 def _or_named(read: Callable[[str], Any], kind: str, **named: str | None) -> Callable[[str], Any]:

@@ -7,20 +7,25 @@ example: pdmp rollout reach.safetensors --context 1.45 --goal 0.4 -0.2 0.9 -o re
 
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import Any
 
 import pdmp
-from pdmp.cli.console import say
-from pdmp.cli.options import add_model, add_output, check_file
+from pdmp.cli.options import add_model, add_output
+from pdmp.cli.streams import inputs, output, summarise
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
     add_model(parser)
-    add_output(parser, "FILE", "CSV to write", required=True)
+    add_output(parser, "FILE", "CSV to write; - is standard output", stream=True, required=True)
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--style", nargs="+", type=float, metavar="S", help="style parameters")
     source.add_argument(
-        "--context", nargs="+", type=_value, metavar="C", help="context to predict the movement for"
+        "--context",
+        nargs="+",
+        metavar="C",
+        help="context to predict the movement for, as values or as NAME=VALUE",
     )
     source.add_argument(
         "--demo", type=int, metavar="M", help="demonstration to reproduce, counted from 0"
@@ -44,17 +49,28 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Loads a model, computes a rollout and writes it."""
-    check_file(options.output)
-    model = pdmp.load(options.model)
-    conditions = None if options.demo is None else model.conditions(options.demo)
-    positions = ("goal", "goal_velocity", "start", "velocity", "anchor")
-    names = ("style", "context", *positions, "amplitude", "tau", "dt", "duration")
-    arguments = {name: value for name in names if (value := getattr(options, name)) is not None}
-    trajectory = model.rollout(conditions, **arguments)
-    if options.context is not None and model.predict(options.context).extrapolation.any():
-        print("pdmp: the context lies outside the demonstrated ones", file=sys.stderr)
-    trajectory.to_csv(options.output)
-    say(f"{options.output}: {len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
+    with output(options.output) as path:
+        with inputs([options.model]) as (file,):
+            model = pdmp.load(file)
+        conditions = None if options.demo is None else model.conditions(options.demo)
+        positions = ("goal", "goal_velocity", "start", "velocity", "anchor")
+        names = ("style", *positions, "amplitude", "tau", "dt", "duration")
+        arguments = {name: value for name in names if (value := getattr(options, name)) is not None}
+        if options.context is not None:
+            arguments["context"] = _context(options.context)
+        trajectory = model.rollout(conditions, **arguments)
+        if "context" in arguments and model.predict(arguments["context"]).extrapolation.any():
+            print("pdmp: the context lies outside the demonstrated ones", file=sys.stderr)
+        trajectory.to_csv(path)
+    summarise(options.output, f"{len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
+
+
+def _context(texts: Sequence[str]) -> Any:
+    """Returns a context, by name if every text is NAME=VALUE."""
+    parts = [text.partition("=") for text in texts]
+    if all(sign and name for name, sign, _ in parts):
+        return {name: _value(value) for name, _, value in parts}
+    return [_value(text) for text in texts]
 
 
 def _value(text: str) -> float | str:

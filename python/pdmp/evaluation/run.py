@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,7 +56,7 @@ def evaluate(
     contexts: ArrayLike | Sequence[Sequence[float | str]] | None = None,
     predictors: Mapping[str, Predictor] | None = None,
     splits: Iterable[Sequence[object]] | None = None,
-    kind: Kind = "discrete",
+    kind: Kind | None = None,
     dt: float | None = None,
     period: ArrayLike | None = None,
     n_samples: int = 101,
@@ -90,8 +90,9 @@ def evaluate(
     splits : iterable of (train, test, reach), optional
         Indices of the training and test demonstrations, and "interpolation" or "extrapolation",
         in place of the folds.
-    kind : str
-        "discrete", or "rhythmic": each demonstration is one cycle.
+    kind : str, optional
+        "discrete", or "rhythmic": each demonstration is one cycle; by default that of cycles, or
+        "discrete".
     dt : float, optional
         Sampling interval [s] of demonstrations without one.
     period : array_like, optional
@@ -137,7 +138,8 @@ def evaluate(
     if progress is not None:
         check_function("progress", progress)
     check_number("max_folds", max_folds)
-    data = recordings(demos, contexts, kind=kind, dt=dt, period=period, n_samples=n_samples)
+    own = kind or cast(Kind, getattr(demos, "kind", "discrete"))
+    data = recordings(demos, contexts, kind=own, dt=dt, period=period, n_samples=n_samples)
     if splits is None:
         folds = held_out(data.numbers(data.contexts), max_folds)
     else:

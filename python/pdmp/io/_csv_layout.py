@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
-from pdmp._labels import split_label
 from pdmp._messages import value_error
 from pdmp.io import _fields
 
@@ -39,6 +40,11 @@ class CsvTable:
     first: int = 0  # line before the first sample
     separator: str = ","
     text: str = field(default="", repr=False)
+    last: float = math.inf  # line of the last sample
+    interval: float | None = None  # of the samples [s], if the file states it
+    n_rows: int | None = None  # number of samples, if the file states it
+    rotations: dict[str, Any] = field(default_factory=dict)  # quaternions, by their first column
+    ignored: set[str] = field(default_factory=set)  # columns that are kept only on demand
 
     def rows(self, *, blank: bool = False) -> Iterator[Row]:
         """Yields line number and fields of each sample, with `blank` also rows of empty fields.
@@ -49,6 +55,10 @@ class CsvTable:
         for line, fields in _parse(self.path, self.text, self.separator):
             if line <= self.first:
                 continue
+            if line > self.last:
+                break
+            while len(fields) > len(self.fields) and not fields[-1]:
+                fields.pop()  # separators at the end of the line
             if len(fields) != len(self.fields) and any(fields):
                 hint = ""
                 if len(fields) > len(self.fields) and self.separator == ",":
@@ -66,20 +76,25 @@ class CsvTable:
             yield line, fields
 
 
-def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False) -> CsvTable:
+def read_text(path: Path) -> str:
+    """Returns the text of a file; spreadsheets write UTF-16 with a byte order mark as "Unicode"."""
+    raw = path.read_bytes()
+    try:
+        return raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
+    except UnicodeDecodeError:
+        raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
+
+
+def parse_layout(
+    path: Path, text: str, is_clock: Callable[[str], bool] | None = None, *, index: bool = False
+) -> CsvTable:
     """Finds separator, header and units of a CSV file.
 
     Comments, which begin with #, a line such as `sep=;` and other lines before the header are
     skipped. The header is the row of names with the number of fields of the samples; among several,
-    the one with a name in `times`. It may be in a comment. A row of units may follow it. The header
-    of an index, whose rows may be words, is its first row.
+    the one with the name of a column of time stamps. It may be in a comment. A row of units may
+    follow it. The header of an index, whose rows may be words, is its first row.
     """
-    raw = path.read_bytes()
-    try:
-        # Spreadsheets write UTF-16 with a byte order mark as "Unicode".
-        text = raw.decode("utf-16" if raw[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8-sig")
-    except UnicodeDecodeError:
-        raise value_error(f"{path}: not UTF-8 text: save it as UTF-8") from None
     separator = _separator(path, text)
     sample = [row for row in islice(_parse(path, text, separator), MAX_PREAMBLE) if any(row[1])]
     sample = [row for row in sample if not _declared_separator(separator.join(row[1]))]
@@ -90,7 +105,7 @@ def parse_layout(path: Path, times: Collection[str] = (), *, index: bool = False
     width = _width([fields for _, fields in sample])
     line, fields = sample[0]
     if not index:
-        line, fields = _header(path, text, separator, sample, width, times)
+        line, fields = _header(path, text, separator, sample, width, is_clock)
     below = next((row for row in sample if row[0] > line), None)
     units, first = None, line
     if not index and below is not None and len(below[1]) == width and _are_units(below[1]):
@@ -146,7 +161,12 @@ def _width(rows: list[list[str]]) -> int:
 
 
 def _header(
-    path: Path, text: str, separator: str, sample: list[Row], width: int, times: Collection[str]
+    path: Path,
+    text: str,
+    separator: str,
+    sample: list[Row],
+    width: int,
+    is_clock: Callable[[str], bool] | None,
 ) -> Row:
     """Returns the row that names the columns, or the first row."""
     named: list[Row] = []
@@ -158,7 +178,7 @@ def _header(
         if len(fields) == width and not units and _are_names(fields):
             named.append((line, fields))
         previous = fields
-    timed = [row for row in named if any(split_label(cell)[0] in times for cell in row[1])]
+    timed = [row for row in named if is_clock and any(map(is_clock, row[1]))]
     if len(timed or named) > 1 and not timed:
         raise value_error(
             f"{path}: lines {named[0][0]} and {named[1][0]} may both name the columns: delete the "

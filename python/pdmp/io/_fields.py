@@ -36,7 +36,7 @@ def is_name(field: str) -> bool:
     return bool(field.strip()) and parse_number(field.replace(",", ".", 1)) is None
 
 
-def column_indices(path: Path, header: Sequence[str], names: Sequence[str]) -> list[int]:
+def column_indices(path: Path | str, header: Sequence[str], names: Sequence[str]) -> list[int]:
     """Returns the index of the column of each name."""
     indices = {name: k for k, name in enumerate(header)}
     for name in names:

@@ -13,7 +13,7 @@ from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields
-from pdmp.io._demonstration import check_options, make_demonstration
+from pdmp.io._demonstration import Options, make_demonstration
 
 if TYPE_CHECKING:
     from bvh import Bvh
@@ -30,8 +30,8 @@ def read_bvh(
     """Reads one demonstration from a BVH file; needs the extra `bvh`.
 
     Each channel is a degree of freedom, named after joint and channel, such as `LeftLeg.Xrotation`.
-    Rotations are converted from degrees to rad. Positions are in the unit of the file, which the
-    format does not state.
+    Rotations are converted from degrees to rad, without jumps by full turns. Positions are in the
+    unit of the file, which the format does not state.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def read_bvh(
     OSError
         A file that cannot be read.
     """
-    check_options(dt, max_gap)
+    Options(columns, dt, max_gap)
     path = Path(path)
     motion = _parsed(path)
     try:
@@ -79,8 +79,11 @@ def read_bvh(
     indices = _fields.column_indices(path, channels, names)
     position = np.array([_frame(path, k, row, channels) for k, row in enumerate(motion.frames)])
     position = position.reshape(n_frames, len(channels))[:, indices]
-    rotational = [name.endswith("rotation") for name in names]
+    rotational = np.array([name.endswith("rotation") for name in names], bool)
+    # Programs write angles within a turn. A gap, which is NaN, has no turns to count across.
+    steady = rotational & np.isfinite(position).all(0)
     position[:, rotational] = np.deg2rad(position[:, rotational])
+    position[:, steady] = np.unwrap(position[:, steady], axis=0)
     return make_demonstration(
         path,
         position,

@@ -1,78 +1,29 @@
-"""Readers of folders with an index, and of several files and folders together."""
+"""Reader of folders of recordings, with or without an index."""
 
+from __future__ import annotations
+
+import errno
+import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from pdmp._labels import name_list, split_label
-from pdmp._messages import check_type, value_error
+from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields
-from pdmp.io._csv_layout import parse_layout
+from pdmp.io._collections import NamedDemonstrations
+from pdmp.io._csv_layout import parse_layout, read_text
 from pdmp.io._demonstration import make_demonstration
-from pdmp.io.bvh import read_bvh
-from pdmp.io.csv import read_csv
+from pdmp.io._formats import SINGLE, read_single
 from pdmp.io.npz import read_npz, read_recordings
 
-SINGLE_DEMO_SUFFIXES = (".csv", ".bvh")
-"""Suffixes of formats with one demonstration per file."""
 FORMAT = (
     "expected an index.csv with a row per demonstration and its name in the column 'id', and "
-    "files demos/<id>.csv or demos/<id>.bvh or a demos.npz"
+    "files demos/<id>.csv (or .bvh, .c3d, .trc, …) or a demos.npz"
 )
-
-
-def read(
-    paths: str | PathLike[str] | Iterable[str | PathLike[str]],
-    *,
-    columns: Sequence[str] | None = None,
-    time: str = "t",
-    dt: float | None = None,
-    max_gap: float = 0.0,
-    context: Sequence[str] | None = None,
-) -> list[Demonstration]:
-    """Reads every demonstration in CSV, BVH and NPZ files and folders, in the order given.
-
-    Parameters
-    ----------
-    paths : path or iterable of path
-        Files and folders.
-    columns : sequence of str, optional
-        Names of the degrees of freedom to keep, in this order; all by default.
-    time : str
-        Column of the time stamps in CSV files.
-    dt : float, optional
-        Sampling interval [s], instead of time stamps.
-    max_gap : float
-        Longest gap [s] to interpolate; by default 0, none.
-    context : sequence of str, optional
-        Columns of the index.csv whose numbers or labels form the context (Q,).
-
-    Raises
-    ------
-    ValueError
-        A file of another format, or data that the reader of its format rejects.
-    OSError
-        A file that cannot be read.
-    """
-    demos: list[Demonstration] = []
-    check_type("paths", paths, (str, PathLike, Iterable), "a path, or a list of them")
-    paths = [paths] if isinstance(paths, (str, PathLike)) else paths
-    options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
-    for path in map(Path, paths):
-        if path.is_dir():
-            demos += read_folder(path, time=time, context=context, **options).values()
-        elif context is not None:
-            raise value_error(f"{path}: a context is read from the index.csv of a folder: pass one")
-        elif path.suffix.lower() in SINGLE_DEMO_SUFFIXES:
-            demos.append(_read_single(path, time, **options))
-        elif path.suffix.lower() == ".npz":
-            demos += read_npz(path, **options).values()
-        else:
-            raise value_error(f"{path}: expected a .csv, .bvh or .npz file or a folder")
-    return demos
 
 
 def read_folder(
@@ -86,8 +37,9 @@ def read_folder(
 ) -> dict[str, Demonstration]:
     """Reads the demonstrations that a folder's `index.csv` lists, by their ids.
 
-    Without an index, all CSV and BVH files of the folder, or of its subfolder `demos`, or the file
-    `demos.npz` are read, in natural order of their names and without context.
+    Without an index, all files of the folder, or of its subfolder `demos`, that hold one
+    demonstration each, or the file `demos.npz` are read, in natural order of their names and
+    without context.
 
     Parameters
     ----------
@@ -108,34 +60,44 @@ def read_folder(
     ------
     ValueError
         A folder without demonstrations, an index without the column `id`, a repeated id, an id that
-        is not a file name, a context that is not finite, or data that `read_csv`, `read_bvh` or
-        `read_npz` rejects.
+        is not a file name, a context that is not finite, or data that the
+        reader of the format rejects.
     OSError
         A file that cannot be read.
     """
     path = Path(path)
     options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
     index, archive = path / "index.csv", path / "demos.npz"
-    if path.is_dir() and not index.exists():
+    if not path.is_dir():
+        code = errno.ENOTDIR if path.exists() else errno.ENOENT
+        raise OSError(code, os.strerror(code), str(path))
+    if not index.exists():
         return _read_unlisted(path, time, context, **options)
     contexts = _contexts(index, context or [])
     if not archive.exists():
         files = {name: _file(path, name) for name in contexts}
-        return {
-            name: _read_single(file, time, context=contexts[name], **options)
-            for name, file in files.items()
-        }
+        return NamedDemonstrations(
+            {
+                name: read_single(file, time, context=contexts[name], **options)
+                for name, file in files.items()
+            },
+            context or (),
+        )
     stored = list(read_recordings(archive, columns, dt))
     if len(stored) != len(contexts):
         raise value_error(
             f"{archive}: has {len(stored)} demonstrations, but index.csv lists {len(contexts)}"
         )
-    return {
-        name: make_demonstration(
-            f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
-        )
-        for (name, values), (_, position, arguments) in zip(contexts.items(), stored, strict=True)
-    }
+    recordings = zip(contexts.items(), stored, strict=True)
+    return NamedDemonstrations(
+        {
+            name: make_demonstration(
+                f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
+            )
+            for (name, values), (_, position, arguments) in recordings
+        },
+        context or (),
+    )
 
 
 def _read_unlisted(
@@ -145,10 +107,10 @@ def _read_unlisted(
     if context is None and (path / "demos.npz").exists():
         return read_npz(path / "demos.npz", **options)
     for folder in (path, path / "demos"):
-        files = [file for suffix in SINGLE_DEMO_SUFFIXES for file in folder.glob(f"*{suffix}")]
+        files = [file for file in folder.glob("*") if file.suffix.lower() in SINGLE]
         if files and context is None:
             files.sort(key=lambda file: _natural(file.name))
-            return {file.stem: _read_single(file, time, **options) for file in files}
+            return {file.stem: read_single(file, time, **options) for file in files}
     raise value_error(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
 
 
@@ -162,22 +124,15 @@ def _file(path: Path, name: str) -> Path:
     if not name or re.search(r"[/\\:\x00-\x1f]", name) or name in (".", ".."):
         raise value_error(f"{path / 'index.csv'}: id '{name}' is not a file name: {FORMAT}")
     folder = path / "demos"
-    paths = [folder / f"{name}{suffix}" for suffix in SINGLE_DEMO_SUFFIXES]
-    if name.lower().endswith(SINGLE_DEMO_SUFFIXES):
+    paths = [folder / f"{name}{suffix}" for suffix in SINGLE]
+    if name.lower().endswith(tuple(SINGLE)):
         paths.append(folder / name)
     return next((path for path in paths if path.exists()), paths[0])
 
 
-def _read_single(path: Path, time: str, **options: Any) -> Demonstration:
-    """Reads a file of one demonstration; BVH files have no column of time stamps."""
-    if path.suffix.lower() == ".bvh":
-        return read_bvh(path, **options)
-    return read_csv(path, time=time, **options)
-
-
 def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:
     """Returns the context of each id in an index; a column without numbers has labels."""
-    table = parse_layout(path, index=True)
+    table = parse_layout(path, read_text(path), index=True)
     header, lines = [split_label(field)[0] for field in table.fields], list(table.rows())
     if table.separator != ",":
         lines = [(line, list(map(_with_point, fields))) for line, fields in lines]

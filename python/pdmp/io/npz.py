@@ -13,7 +13,7 @@ from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _fields, _npz_arrays, _time_units
-from pdmp.io._demonstration import check_options, make_demonstration
+from pdmp.io._demonstration import Options, make_demonstration
 
 LAYOUT = "store time (T,) and position (T, D), or arrays NAME (T, D) and NAME.t (T,)"
 
@@ -47,7 +47,7 @@ def read_npz(
     OSError
         A file that cannot be read.
     """
-    check_options(dt, max_gap)
+    Options(columns, dt, max_gap)
     return {
         name: make_demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **arguments)
         for name, position, arguments in read_recordings(Path(path), columns, dt)

@@ -1,11 +1,12 @@
 """Vectorisation of functions of one demonstration."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 from pdmp._messages import printable
 from pdmp._native import Demonstration
+from pdmp.io._collections import ListedDemonstrations, NamedDemonstrations
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -32,10 +33,13 @@ def vectorized(function: Callable[Concatenate[Demonstration, P], R]) -> Vectoriz
 
     @wraps(function)
     def for_each(demo: Any, *args: Any, **kwargs: Any) -> Any:
+        names = getattr(demo, "context_names", None)
         if isinstance(demo, Mapping):
-            return {name: _apply(name, one, args, kwargs) for name, one in demo.items()}
+            own = {name: _apply(name, one, args, kwargs) for name, one in demo.items()}
+            return NamedDemonstrations(own, names) if names and _demos(own.values()) else own
         if isinstance(demo, Sequence) and not isinstance(demo, str):
-            return [_apply(f"demo {m}", one, args, kwargs) for m, one in enumerate(demo)]
+            listed = [_apply(f"demo {m}", one, args, kwargs) for m, one in enumerate(demo)]
+            return ListedDemonstrations(listed, names) if names and _demos(listed) else listed
         return function(demo, *args, **kwargs)
 
     def _apply(name: object, demo: Demonstration, args: Any, kwargs: Any) -> Any:
@@ -46,3 +50,7 @@ def vectorized(function: Callable[Concatenate[Demonstration, P], R]) -> Vectoriz
             raise kind(printable(f"{name}: {error}")) from None
 
     return for_each
+
+
+def _demos(values: Iterable[Any]) -> bool:
+    return all(isinstance(value, Demonstration) for value in values)

@@ -38,10 +38,14 @@ class Growth(NamedTuple):
 
 
 class Cycles(Sequence[Demonstration]):
-    """Closed cycles that begin at a common phase, for `fit(kind="rhythmic")`.
+    """Closed cycles that begin at a common phase, which `fit` learns as a rhythmic movement.
 
     Attributes
     ----------
+    kind : str
+        "rhythmic", which `fit` uses unless it is given a kind.
+    contexts : dict or None
+        Context values of the cycles by the names of the recordings' contexts.
     periods : (K,) array
         Period of each cycle in s: its number of samples times its dt.
     recordings : list of int
@@ -54,6 +58,8 @@ class Cycles(Sequence[Demonstration]):
         Degrees of freedom that turn, or whose gain per cycle exceeds their range within it.
     """
 
+    kind = "rhythmic"
+
     def __init__(
         self,
         demos: list[Demonstration],
@@ -62,6 +68,7 @@ class Cycles(Sequence[Demonstration]):
         rejected: list[Rejected],
         gains: NDArray[np.float64],
         growths: list[Growth],
+        contexts: dict[str, list[float | str]] | None = None,
     ) -> None:
         self._demos = demos
         self.periods = periods
@@ -69,6 +76,7 @@ class Cycles(Sequence[Demonstration]):
         self.rejected = rejected
         self.gains = gains
         self.growths = growths
+        self.contexts = contexts
 
     def __len__(self) -> int:
         """Returns the number of cycles K."""
@@ -151,6 +159,7 @@ def cycles(
     ----------
     B. Iglewicz, D. C. Hoaglin, How to detect and handle outliers, ASQC Quality Press 1993
     """
+    collection = recordings
     if isinstance(recordings, Mapping) and isinstance(onsets, Mapping):
         if unpaired := sorted(map(str, recordings.keys() ^ onsets.keys())):
             raise value_error(
@@ -171,7 +180,9 @@ def cycles(
     if gaining := [growth for growth in growths if not growth.turns]:
         warn(_gains(gaining, demos))
     rejected = [Rejected(*cycle[:4]) for cycle in outliers]
-    return Cycles(demos, periods, sources, rejected, np.array(gains), growths)
+    names = getattr(collection, "contexts", None) or {}
+    contexts = {name: [column[k] for k in sources] for name, column in names.items()}
+    return Cycles(demos, periods, sources, rejected, np.array(gains), growths, contexts or None)
 
 
 def _gains(growths: list[Growth], demos: list[Demonstration]) -> str:
