@@ -7,6 +7,7 @@ mod nearest;
 #[cfg(feature = "learning")]
 mod quadratic_program;
 mod sampling;
+mod turning;
 #[cfg(feature = "learning")]
 mod variables;
 
@@ -114,9 +115,11 @@ impl Margins {
 /// Conditions or limits that do not fit the primitive.
 pub fn feasible(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditions) -> Result<Margins> {
     limits.check_rotations(primitive)?;
-    let (primitive, conditions) = primitive.inside_with(conditions)?;
-    let bounds = bounds(primitive, limits)?;
-    Ok(Margins::of(&sampled(primitive, &conditions)?, &bounds))
+    let (inside, of_dofs) = primitive.inside_with(conditions)?;
+    let bounds = bounds(inside, &limits.of_plain_dofs(primitive))?;
+    let mut margins = Margins::of(&sampled(inside, &of_dofs)?, &bounds);
+    turning::compare(primitive, limits, conditions, &mut margins)?;
+    Ok(margins)
 }
 
 /// Returns the factor by which a movement must be slowed down to keep the limits of velocity and acceleration.

@@ -102,6 +102,7 @@ fn nearest(
 ) -> Result<Conditions> {
     if let Some(coordinates) = model.primitive().coordinates() {
         limits.check_rotations(model.primitive())?;
+        limits.refuse_rotations(model.primitive())?;
         let inside = Model { primitive: Arc::clone(coordinates.dofs()), ..model.clone() };
         let found = nearest(&inside, limits, &coordinates.constant_in_dofs(request)?, vary, predicted)?;
         let (velocity, goal_velocity) = (request.velocity.clone(), request.goal_velocity.clone());

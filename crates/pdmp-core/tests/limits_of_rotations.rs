@@ -1,0 +1,259 @@
+//! Limits of the angular velocity and acceleration of rotations.
+#![cfg(feature = "learning")]
+#![allow(missing_docs)]
+
+mod common;
+#[path = "common/poses.rs"]
+mod poses;
+#[path = "common/random.rs"]
+mod random;
+
+use std::sync::{Arc, LazyLock};
+
+use common::*;
+use pdmp_core::model::Frame;
+use pdmp_core::motion::{Coupling, Limit, Limits, Margins, TimeGrid, fastest, fastest_tau, feasible};
+use pdmp_core::{Command, Conditions, Controller, Error, FitOptions, Kind, LimitError, Model, Status, fit, rollout};
+use poses::*;
+use random::Random;
+
+/// Screws of a tool: three positions and a rotation.
+static SCREW: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(model_of_screws(IDENTITY, IDENTITY, Frame::Body)));
+/// Wobbling cycles of a rotation alone, whose angular velocity is in the world frame.
+static WOBBLE: LazyLock<Arc<Model>> = LazyLock::new(|| {
+    let options = FitOptions::new(Kind::Rhythmic).frame(Frame::World);
+    Arc::new(fit(&wobbles(4, 1.0, 100).iter().map(turning).collect::<Vec<_>>(), &options).unwrap())
+});
+
+const IDENTITY: Quaternion = [1.0, 0.0, 0.0, 0.0];
+
+/// Fits screws seen from another world with another tool.
+fn model_of_screws(world: Quaternion, tool: Quaternion, frame: Frame) -> Model {
+    let options = FitOptions::new(Kind::Discrete).frame(frame);
+    let turned = |poses| pose(in_frames(&poses, world, tool, &mut Random(1)));
+    fit(&screws(5, 4.0, 0.5, 101, 1).into_iter().map(turned).collect::<Vec<_>>(), &options).unwrap()
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn transposed(m: Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]))
+}
+
+/// Published motion of the rotation: the quaternion, and the angular velocity and acceleration in the body frame and in the world
+/// frame.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    q: Quaternion,
+    omega: [[f64; 3]; 2],
+    acceleration: [[f64; 3]; 2],
+}
+
+impl Turn {
+    fn of(controller: &Controller, frame: Frame) -> Self {
+        let n = controller.position().len();
+        let q: Quaternion = std::array::from_fn(|i| controller.position()[n - 4 + i]);
+        let n = controller.velocity().len();
+        let in_frames = |vector: &[f64]| {
+            let own: [f64; 3] = std::array::from_fn(|i| vector[n - 3 + i]);
+            match frame {
+                Frame::Body => [own, apply(matrix(q), own)],
+                Frame::World => [apply(transposed(matrix(q)), own), own],
+            }
+        };
+        Self { q, omega: in_frames(controller.velocity()), acceleration: in_frames(controller.acceleration()) }
+    }
+
+    /// Returns by how much a tick of length `h` to another motion exceeds the limits, relative to them.
+    fn excess(&self, to: &Self, h: f64, velocity: f64, acceleration: f64) -> f64 {
+        let rounding = 4e-15 * (norm(self.omega[0]) + norm(to.omega[0]));
+        let change = |frame: usize| {
+            let change = norm(minus(to.omega[frame], self.omega[frame])) - rounding;
+            change / (acceleration * h) - 1.0
+        };
+        // The sine of half an angle is below half of it; a command may express the same rotation anew, to rounding.
+        let turned = 2.0 * times(back(self.q), to.q)[1..].iter().map(|x| x * x).sum::<f64>().sqrt().min(1.0);
+        let angle = (turned - 1e-13) / (velocity * h) - 1.0;
+        let size = norm(to.omega[0]) / velocity - 1.0;
+        let bend = norm(to.acceleration[0]) / acceleration - 1.0;
+        change(0).max(change(1)).max(angle).max(size).max(bend)
+    }
+}
+
+/// Limits of the rotation, which has the last three DoFs, alone.
+fn angular(model: &Model, velocity: f64, acceleration: f64) -> Limits {
+    let vector = |limit: f64| {
+        let n = model.n_dofs();
+        Some((0..n).map(|dof| if dof + 3 >= n { limit } else { f64::INFINITY }).collect())
+    };
+    Limits { velocity: vector(velocity), acceleration: vector(acceleration), ..Limits::default() }
+}
+
+fn frame(model: &Model) -> Frame {
+    model.primitive().coordinates().unwrap().frame()
+}
+
+/// Random position with a unit quaternion.
+fn random_place(model: &Model, scale: f64, random: &mut Random) -> Vec<f64> {
+    let n = model.n_coordinates();
+    let rotation = random_rotation(random);
+    (0..n - 4).map(|_| scale * random.between(-1.0, 1.0)).chain(rotation).collect()
+}
+
+/// No sequence of commands, measurements, coupling terms and tick lengths leaves the limits of a rotation, in any frame.
+#[test]
+fn no_command_leaves_the_limits() {
+    let mut random = Random(7);
+    let (mut ticks, mut limited) = (0, 0);
+    for case in 0..60 {
+        let model = [&*SCREW, &*WOBBLE][case % 2];
+        let (n, j, frame) = (model.n_dofs(), model.n_styles(), frame(model));
+        let discrete = model.kind() == Kind::Discrete;
+        let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
+        let (velocity, acceleration) = (random.scale(0.1, 30.0), random.scale(1.0, 1000.0));
+        let mut limits = angular(model, velocity, acceleration);
+        limits.synchronous = case % 4 < 2;
+        controller.set_limits(&limits).unwrap();
+        controller.step().unwrap();
+        let mut before = Turn::of(&controller, frame);
+        let mut inside = norm(before.omega[0]) <= velocity;
+        for tick in 0..2000 {
+            let h = if case % 3 == 0 { 1e-3 } else { random.scale(1e-6, 0.1) };
+            let scale = random.scale(0.1, 100.0);
+            let (goal, measured) = (random_place(model, 0.3, &mut random), random_place(model, 0.3, &mut random));
+            let terms: Vec<f64> = (0..n).map(|_| scale * random.between(-1.0, 1.0)).collect();
+            let style: Vec<f64> = (0..j).map(|_| random.between(-2.0, 2.0)).collect();
+            let rare = |random: &mut Random| random.next() < 0.01;
+            let command = Command {
+                dt: Some(h),
+                goal: (discrete && rare(&mut random)).then_some(&goal),
+                anchor: (!discrete && rare(&mut random)).then_some(&goal),
+                style: rare(&mut random).then_some(&style),
+                tau: rare(&mut random).then(|| model.tau() * random.scale(0.1, 10.0)),
+                measured: rare(&mut random).then_some(&measured),
+                coupling: rare(&mut random).then_some(Coupling { velocity: &terms, acceleration: &terms }),
+                phase: (!discrete && rare(&mut random)).then(|| random.between(0.0, 6.0)),
+                ..Command::default()
+            };
+            controller.step_with(&command).unwrap();
+            let after = Turn::of(&controller, frame);
+            let motion = [controller.position(), controller.velocity(), controller.acceleration()];
+            assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{case} {tick}");
+            // A rhythmic movement may start faster than its limits, and is inside them once it has braked.
+            inside |= norm(after.omega[0]) <= velocity;
+            let most = if inside { velocity } else { f64::INFINITY };
+            let excess = before.excess(&after, h, most, acceleration);
+            assert!(excess <= 1e-9, "{case} {tick}: {excess}, {before:?} to {after:?} in {h}");
+            before = after;
+            ticks += 1;
+            limited += usize::from(controller.limited()[n - 1].is_some());
+            if rare(&mut random) {
+                controller.set_speed(random.between(0.0, 2.0).floor()).unwrap();
+            }
+            if rare(&mut random) {
+                controller.release();
+            }
+            if rare(&mut random) && !discrete {
+                controller.set_phase(random.between(0.0, 6.0)).unwrap();
+            }
+            let now = Turn::of(&controller, frame);
+            assert!(norm(minus(now.omega[1], before.omega[1])) <= 1e-12 * velocity, "{case} {tick}");
+        }
+        assert!(inside);
+    }
+    assert!(limited > ticks / 10, "{limited} of {ticks}");
+    println!("{limited} of {ticks}");
+}
+
+/// Limits that do not bind leave the motion as it is, to the last bit.
+#[test]
+fn wide_limits_change_nothing() {
+    for model in [&*SCREW, &*WOBBLE] {
+        let controller = || Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
+        let (mut free, mut limited) = (controller(), controller());
+        limited.set_limits(&angular(model, 1e3, 1e6)).unwrap();
+        let goal = random_place(model, 0.3, &mut Random(2));
+        for tick in 0..3000 {
+            let command = match model.kind() {
+                Kind::Discrete => Command { goal: (tick == 300).then_some(&goal), ..Command::default() },
+                Kind::Rhythmic => Command { anchor: (tick == 300).then_some(&goal), ..Command::default() },
+            };
+            assert_eq!(free.step_with(&command).unwrap(), limited.step_with(&command).unwrap());
+            assert_eq!(
+                (free.position(), free.velocity(), free.acceleration()),
+                (limited.position(), limited.velocity(), limited.acceleration())
+            );
+            assert!(limited.limited().iter().all(Option::is_none));
+        }
+    }
+}
+
+/// Limits without slack stretch a movement in time, on its path, and it ends at its goal; the rotation is named.
+#[test]
+fn limits_slow_the_movement_on_its_path() {
+    let model = &*SCREW;
+    let mut free = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
+    let (mut path, mut peaks) = (Vec::new(), [0.0f64; 2]);
+    while free.step().unwrap() == Status::Working {
+        let turn = Turn::of(&free, Frame::Body);
+        peaks = [peaks[0].max(norm(turn.omega[0])), peaks[1].max(norm(turn.acceleration[0]))];
+        path.push((free.phase(), turn.q));
+    }
+    let mut limited = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
+    let (velocity, acceleration) = (0.5 * peaks[0], 0.3 * peaks[1]);
+    limited.set_limits(&angular(model, velocity, acceleration)).unwrap();
+    let mut before = Turn::of(&limited, Frame::Body);
+    let (mut named, mut off, mut k, mut fastest) = ([0, 0], 0.0f64, 0, 0.0f64);
+    while limited.step().unwrap() == Status::Working {
+        let turn = Turn::of(&limited, Frame::Body);
+        assert!(before.excess(&turn, 1e-3, velocity, acceleration) <= 1e-9);
+        fastest = fastest.max(norm(turn.omega[0]) / velocity);
+        before = turn;
+        match limited.limited()[5] {
+            Some(Limit::Velocity) => named[0] += 1,
+            Some(Limit::Acceleration) => named[1] += 1,
+            _ => {}
+        }
+        while k + 2 < path.len() && path[k + 1].0 > limited.phase() {
+            k += 1;
+        }
+        // The chord between neighbours on the free path.
+        let (from, to) = (path[k], path[k + 1]);
+        if from.0 - to.0 > 1e-9 && k > 0 && k + 2 < path.len() {
+            let share = (from.0 - limited.phase()) / (from.0 - to.0);
+            let between = times(from.1, turn_by(times(back(from.1), to.1), share));
+            off = off.max(angle(between, turn.q));
+        }
+        assert!(limited.time() < 10.0);
+    }
+    println!("{named:?} {off} {fastest} {} {}", free.time(), limited.time());
+    assert!(named[0] > 100 && named[1] > 100, "{named:?}");
+    assert!(off < 1e-4, "{off}");
+    assert!(limited.time() > 1.4 * free.time());
+    let goal = model.rollout_end();
+    assert!(angle(before.q, goal) < 0.02);
+}
+
+fn turn_by(q: Quaternion, share: f64) -> Quaternion {
+    let half = q[1..].iter().map(|x| x * x).sum::<f64>().sqrt().atan2(q[0].abs());
+    let sign = q[0].signum();
+    turn([sign * q[1], sign * q[2], sign * q[3]], 2.0 * half * share)
+}
+
+trait End {
+    fn rollout_end(&self) -> Quaternion;
+}
+
+impl End for Model {
+    fn rollout_end(&self) -> Quaternion {
+        let grid = TimeGrid { dt: 1e-3, duration: Some(3.0 * self.duration()) };
+        let movement = rollout(self.primitive(), &Conditions::default(), grid).unwrap();
+        rotation(movement.position.row(movement.time.len() - 1), self.n_coordinates() - 4)
+    }
+}
