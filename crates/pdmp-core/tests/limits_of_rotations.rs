@@ -11,6 +11,7 @@ mod random;
 use std::sync::{Arc, LazyLock};
 
 use common::*;
+use ndarray::{Array1, Array2, s};
 use pdmp_core::model::Frame;
 use pdmp_core::motion::{Coupling, Limit, Limits, Margins, TimeGrid, fastest, fastest_tau, feasible};
 use pdmp_core::{Command, Conditions, Controller, Error, FitOptions, Kind, LimitError, Model, Status, fit, rollout};
@@ -146,10 +147,10 @@ fn no_command_leaves_the_limits() {
             let motion = [controller.position(), controller.velocity(), controller.acceleration()];
             assert!(motion.into_iter().flatten().all(|x| x.is_finite()), "{case} {tick}");
             // A rhythmic movement may start faster than its limits, and is inside them once it has braked.
-            inside |= norm(after.omega[0]) <= velocity;
             let most = if inside { velocity } else { f64::INFINITY };
             let excess = before.excess(&after, h, most, acceleration);
             assert!(excess <= 1e-9, "{case} {tick}: {excess}, {before:?} to {after:?} in {h}");
+            inside |= norm(after.omega[0]) <= velocity;
             before = after;
             ticks += 1;
             limited += usize::from(controller.limited()[n - 1].is_some());
@@ -168,7 +169,6 @@ fn no_command_leaves_the_limits() {
         assert!(inside);
     }
     assert!(limited > ticks / 10, "{limited} of {ticks}");
-    println!("{limited} of {ticks}");
 }
 
 /// Limits that do not bind leave the motion as it is, to the last bit.
@@ -232,12 +232,200 @@ fn limits_slow_the_movement_on_its_path() {
         }
         assert!(limited.time() < 10.0);
     }
-    println!("{named:?} {off} {fastest} {} {}", free.time(), limited.time());
     assert!(named[0] > 100 && named[1] > 100, "{named:?}");
     assert!(off < 1e-4, "{off}");
     assert!(limited.time() > 1.4 * free.time());
     let goal = model.rollout_end();
     assert!(angle(before.q, goal) < 0.02);
+}
+
+/// Returns the largest |ω| and |ω̇| of a rotation that has the last three DoFs.
+fn peaks(velocity: &Array2<f64>, acceleration: &Array2<f64>) -> [f64; 2] {
+    [velocity, acceleration].map(|rows| {
+        let own = rows.slice(s![.., -3..]);
+        own.rows().into_iter().map(|row| row.dot(&row).sqrt()).fold(0.0, f64::max)
+    })
+}
+
+/// The smallest constant τ reaches one of the limits, and a sampled movement confirms it; so do the margins.
+#[test]
+fn fastest_tau_reaches_a_limit() {
+    let mut random = Random(4);
+    let model = &*SCREW;
+    for case in 0..12 {
+        let style: Vec<f64> = (0..model.n_styles()).map(|_| random.between(-1.0, 1.0)).collect();
+        let conditions = Conditions {
+            style: Some(style),
+            goal: (case % 2 == 1).then(|| random_place(model, 0.3, &mut random)),
+            ..Conditions::default()
+        };
+        let (velocity, acceleration) = (random.scale(0.5, 5.0), random.scale(3.0, 100.0));
+        let mut limits = angular(model, velocity, acceleration);
+        if case % 3 == 0 {
+            limits.velocity.as_mut().unwrap()[0] = 0.1;
+        }
+        let tau = fastest_tau(model.primitive(), &limits, &conditions).unwrap();
+        let at = |tau: f64| Conditions { tau: Some(tau), ..conditions.clone() };
+        let grid =
+            TimeGrid { dt: 2e-4 * tau / model.tau(), duration: Some(1.5 * model.duration() * tau / model.tau()) };
+        let movement = rollout(model.primitive(), &at(tau), grid).unwrap();
+        let [fast, hard] = peaks(&movement.velocity, &movement.acceleration);
+        let other = movement.velocity.column(0).fold(0.0f64, |most, v| most.max(v.abs())) / 0.1;
+        let ratio = (fast / velocity).max(hard / acceleration).max(if case % 3 == 0 { other } else { 0.0 });
+        assert!((ratio - 1.0).abs() < 1e-5, "{case}: {ratio}");
+        let margins: Margins = feasible(model.primitive(), &limits, &at(tau)).unwrap();
+        assert!(margins.is_feasible());
+        assert!(!feasible(model.primitive(), &limits, &at(0.999 * tau)).unwrap().is_feasible());
+        if fast > (1.0 - 1e-6) * velocity {
+            assert_eq!(margins.velocity.unwrap().dof, model.n_dofs() - 3);
+        }
+    }
+}
+
+/// The fastest movement keeps the limits, follows the path, and uses them: at almost every sample one of them is nearly reached.
+#[test]
+fn fastest_movement_keeps_and_uses_the_limits() {
+    let mut random = Random(9);
+    let model = &*SCREW;
+    let end = |rows: &Array2<f64>| rotation(rows.row(rows.nrows() - 1), 3);
+    for _ in 0..8 {
+        let style: Vec<f64> = (0..model.n_styles()).map(|_| random.between(-1.0, 1.0)).collect();
+        let conditions = Conditions { style: Some(style), ..Conditions::default() };
+        let (velocity, acceleration) = (random.scale(0.5, 5.0), random.scale(3.0, 100.0));
+        let limits = angular(model, velocity, acceleration);
+        let movement = fastest(model.primitive(), &limits, &conditions, 1e-3).unwrap();
+        let [fast, hard] = peaks(&movement.velocity, &movement.acceleration);
+        assert!(fast <= 1.005 * velocity && hard <= 1.01 * acceleration, "{} {}", fast / velocity, hard / acceleration);
+        let size = |rows: &Array2<f64>, k: usize| norm(std::array::from_fn(|i| rows[[k, 3 + i]]));
+        let n = movement.time.len();
+        let used = (1..n - 1).filter(|&k| {
+            size(&movement.velocity, k) > 0.97 * velocity || size(&movement.acceleration, k) > 0.95 * acceleration
+        });
+        assert!(used.count() as f64 > 0.9 * (n - 2) as f64);
+        let tau = fastest_tau(model.primitive(), &limits, &conditions).unwrap();
+        let constant = model.duration() * tau / model.tau();
+        assert!(movement.time[n - 1] < constant, "{} {constant}", movement.time[n - 1]);
+        let grid = TimeGrid { dt: model.duration() / 1000.0, duration: None };
+        let nominal = rollout(model.primitive(), &conditions, grid).unwrap();
+        assert!(angle(end(&movement.position), end(&nominal.position)) < 1e-4);
+    }
+}
+
+/// The limited motion of a model fitted in another world with another tool is the same movement seen from there, whichever frame
+/// its angular velocities are in.
+#[test]
+fn limited_motion_does_not_depend_on_the_frames() {
+    let mut random = Random(11);
+    let [world, tool] = [(); 2].map(|()| random_rotation(&mut random));
+    let other = Arc::new(model_of_screws(world, tool, Frame::World));
+    let start = |model: &Arc<Model>| {
+        let mut controller = Controller::new(model.primitive(), 2e-3, &Conditions::default(), None).unwrap();
+        controller.set_limits(&angular(model, 2.0, 12.0)).unwrap();
+        controller
+    };
+    let (mut here, mut there) = (start(&SCREW), start(&other));
+    let (mut off, mut n_limited) = (0.0f64, 0);
+    for tick in 0..1500 {
+        let mut goal = vec![0.1, 0.2, 0.1];
+        goal.extend(times(rotation(Array1::from(here.position().to_vec()).view(), 3), turn([1.0, 0.3, -0.6], 1.0)));
+        let mut turned = goal.clone();
+        let q: Quaternion = std::array::from_fn(|i| goal[3 + i]);
+        turned[3..].copy_from_slice(&times(times(world, q), tool));
+        let command = |place| Command {
+            goal: (tick == 200).then_some(place),
+            measured: (tick % 300 == 250).then_some(place),
+            tau: (tick == 500).then(|| 0.4 * SCREW.tau()),
+            ..Command::default()
+        };
+        here.step_with(&command(&goal)).unwrap();
+        there.step_with(&command(&turned)).unwrap();
+        let [a, b] = [Turn::of(&here, Frame::Body), Turn::of(&there, Frame::World)];
+        let expected = apply(matrix(world), a.omega[1]);
+        off = off.max(angle(times(times(world, a.q), tool), b.q)).max(norm(minus(expected, b.omega[1])));
+        n_limited += usize::from(here.limited()[3].is_some());
+        assert_eq!(here.limited(), there.limited(), "{tick}");
+    }
+    assert!(off < 1e-9, "{off:e}");
+    assert!(n_limited > 300, "{n_limited}");
+}
+
+/// Limits without meaning are refused by one clear error, and leave the last ones in force.
+#[test]
+fn bad_limits_of_rotations_are_refused() {
+    let model = &*SCREW;
+    let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
+    let kept = angular(model, 2.0, 10.0);
+    controller.set_limits(&kept).unwrap();
+    assert_eq!(controller.limits().velocity, kept.velocity);
+    let infinity = f64::INFINITY;
+    let unequal = Some(vec![infinity, infinity, infinity, 2.0, 2.5, 2.0]);
+    for (limits, text) in [
+        (
+            Limits { velocity: unequal.clone(), ..Limits::default() },
+            "DoF 4: a limit of 2.5 for the velocity, of DoF 3 2;",
+        ),
+        (
+            Limits { acceleration: unequal, ..Limits::default() },
+            "DoF 4: a limit of 2.5 for the acceleration, of DoF 3 2;",
+        ),
+        (Limits { upper: Some(vec![3.0]), ..Limits::default() }, "DoF 3: a rotation has no limit of the position"),
+        (
+            Limits { acceleration: Some(vec![9.0]), jerk: Some(vec![1e3]), ..Limits::default() },
+            "DoF 3: a rotation has no limit of the jerk",
+        ),
+    ] {
+        let error = controller.set_limits(&limits).unwrap_err();
+        assert!(error.to_string().contains(text), "{error}");
+        assert!(matches!(error, Error::Limits(LimitError::OfRotation { .. } | LimitError::UnequalOfRotation { .. })));
+        assert!(fastest_tau(model.primitive(), &limits, &Conditions::default()).is_err());
+        assert!(feasible(model.primitive(), &limits, &Conditions::default()).is_err());
+    }
+    assert_eq!(controller.limits().velocity, kept.velocity);
+    // One number serves all DoFs.
+    let one = Limits { velocity: Some(vec![1.0]), ..Limits::default() };
+    controller.set_limits(&one).unwrap();
+    assert_eq!(controller.limits().velocity, Some(vec![1.0; 6]));
+}
+
+/// Limits count from the angular velocity of the last tick, though a command has changed the motion at once since then; a movement
+/// restored from a snapshot continues to the bit while it is limited.
+#[test]
+fn limited_motion_continues_across_commands_and_snapshots() {
+    for model in [&*SCREW, &*WOBBLE] {
+        let frame = frame(model);
+        let mut controller = Controller::new(model.primitive(), 1e-3, &Conditions::default(), Some(0.0)).unwrap();
+        for _ in 0..400 {
+            controller.step().unwrap();
+        }
+        let before = Turn::of(&controller, frame);
+        controller.set_tau(0.3 * model.tau()).unwrap();
+        assert!(norm(minus(Turn::of(&controller, frame).omega[1], before.omega[1])) > 0.5);
+        controller.set_limits(&angular(model, 20.0, 5.0)).unwrap();
+        controller.step().unwrap();
+        let mut after = Turn::of(&controller, frame);
+        assert!(before.excess(&after, 1e-3, 20.0, 5.0) <= 1e-9);
+        let mut moving = f64::NAN;
+        for tick in 0..600 {
+            let mut restored = Controller::restore(model.primitive(), &controller.snapshot()).unwrap();
+            if tick == 300 {
+                controller.set_speed(0.0).unwrap();
+                restored.set_speed(0.0).unwrap();
+                moving = norm(after.omega[0]);
+            }
+            controller.step().unwrap();
+            restored.step().unwrap();
+            assert_eq!(
+                (controller.position(), controller.velocity(), controller.acceleration()),
+                (restored.position(), restored.velocity(), restored.acceleration()),
+            );
+            let now = Turn::of(&controller, frame);
+            assert!(after.excess(&now, 1e-3, 20.0, 5.0) <= 1e-9, "{tick}");
+            after = now;
+        }
+        // In the pause the rotation slows with its limit.
+        let rest = (moving - 5.0 * 0.3).max(0.0);
+        assert!(moving > 0.5 && (norm(after.omega[0]) - rest).abs() < 1e-6, "{moving} {}", norm(after.omega[0]));
+    }
 }
 
 fn turn_by(q: Quaternion, share: f64) -> Quaternion {

@@ -58,8 +58,8 @@ pub enum LimitError {
     },
     /// Limits of the three DoFs of a rotation that are not equal.
     #[error(
-        "limits of DoF {dof}: a {quantity} of {} after {} for the rotation of DoF {first}; a limit bounds the size of the angular \
-         {quantity}, which depends on no frame: give its three DoFs equal numbers",
+        "limits of DoF {dof}: a limit of {} for the {quantity}, of DoF {first} {}; both are DoFs of one rotation, and its limit bounds \
+         the size of the angular {quantity}, which depends on no frame: give equal numbers",
         Number(*limit),
         Number(*expected)
     )]

@@ -93,7 +93,7 @@ impl AngularLimits {
         let rotation = if turned.iter().all(|x| x.is_finite()) { turned } else { from.rotation };
         let change = add_scaled(velocity, -1.0, start).map(|x| x / h.max(MIN_TICK));
         let back = inverse(rotation);
-        let acceleration = self.reduced(rotate(back, change));
+        let acceleration = within(rotate(back, change), self.acceleration * (1.0 - MARGIN));
         (Turning { rotation, velocity: rotate(back, velocity), acceleration }, limit)
     }
 
@@ -114,15 +114,15 @@ impl AngularLimits {
         if size(add_scaled(by_velocity, -1.0, start)) <= reach || from == 0.0 {
             return (by_velocity, Limit::Velocity);
         }
-        // The circle in which both spheres intersect, by its centre on the axis of ω₀ and its radius.
-        let along = (most * (most / from) + from - reach * (reach / from)) * 0.5;
-        let radius = ((most - along) * (most + along)).max(0.0).sqrt();
+        // The circle in which both spheres intersect, by the change of ω along ω₀ and across it: without cancellation.
+        let along = ((most - from) * ((most + from) / from) - reach * (reach / from)) * 0.5;
+        let across = ((reach - along) * (reach + along)).max(0.0).sqrt();
         let axis = start.map(|x| x / from);
         let off = add_scaled(wanted, -dot(wanted, axis), axis);
-        let centre = axis.map(|x| x * along.clamp(-most, most));
         let distance = size(off);
-        let share = if distance > 0.0 && distance.is_finite() { radius / distance } else { 0.0 };
-        (add_scaled(centre, share, off), Limit::Acceleration)
+        let share = if distance > 0.0 && distance.is_finite() { across / distance } else { 0.0 };
+        let moved = add_scaled(start, along.clamp(-reach, reach), axis);
+        (add_scaled(moved, share, off), Limit::Acceleration)
     }
 }
 
@@ -192,7 +192,7 @@ mod tests {
                 let wanted = Turning { rotation, velocity: vector(&mut random, 3.0 * velocity), ..at };
                 let (next, _) = limits.follow(&at, &wanted, h);
                 assert!(size(next.velocity) <= velocity && size(next.acceleration) <= acceleration);
-                let rounding = 1e-15 * velocity;
+                let rounding = 8e-15 * velocity;
                 for [from, to] in [[at.velocity, next.velocity], [at, next].map(|at| rotate(at.rotation, at.velocity))]
                 {
                     assert!(size(add_scaled(to, -1.0, from)) <= acceleration * h + rounding);

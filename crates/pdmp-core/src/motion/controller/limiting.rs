@@ -157,8 +157,7 @@ impl Controller {
     /// Applies the limits to the tick of `dt` seconds and `h` on the clock that has just been computed, from ρ = `rate`.
     #[inline(always)]
     pub(super) fn enforce_limits(&mut self, dt: f64, h: f64, rate: f64) {
-        let kept_by_all = compute(Admission { controller: self, dt })
-            & self.admits_turns(dt)
+        let kept_by_all = compute(Admission { controller: self, dt }) & self.admits_turns(dt)
             && !(self.limiter.has_jerk() && (0..self.groups.len()).any(|index| self.breaks_jerk(index, dt).any()));
         if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
             self.limit(dt, h, rate);

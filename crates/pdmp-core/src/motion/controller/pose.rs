@@ -85,8 +85,9 @@ impl Kernel for Publish<'_> {
 
     #[inline(always)]
     fn run<T: Register>(self) {
-        let Controller { pose, primitive, position, velocity, acceleration, rate, perturbation, clock, limiter, .. } =
-            self.0;
+        let Controller {
+            pose, primitive, position, velocity, acceleration, rate, perturbation, clock, limiter, ..
+        } = self.0;
         let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
         let phase_rate = perturbation.phase_rate();
         let rates = [rate.value(), rate.rate()].map(|rate| phase_rate * first_element(rate));

@@ -68,9 +68,9 @@ impl Controller {
         self.publish_pose();
         let Self { pose: Some(pose), limiter, .. } = self else { return true };
         let turns = limiter.turns.iter().zip(&pose.turns);
-        turns.filter(|(limited, _)| limited.limits.are_finite()).all(|(limited, turn)| {
-            limited.limits.admits(&limited.before, turn, dt)
-        })
+        turns
+            .filter(|(limited, _)| limited.limits.are_finite())
+            .all(|(limited, turn)| limited.limits.admits(&limited.before, turn, dt))
     }
 
     /// Limits the rotations that do not keep their limits over a tick of `dt` seconds, sets their excess, and returns the squares of
@@ -184,7 +184,8 @@ impl Controller {
     /// Names the rotations that are near a limit which slows the clock.
     pub(super) fn name_turns(&mut self, dt: f64) {
         let Self { pose: Some(pose), limiter, .. } = self else { return };
-        for (limited, turn) in limiter.turns.iter().zip(&pose.turns).filter(|(limited, _)| limited.limits.are_finite()) {
+        for (limited, turn) in limiter.turns.iter().zip(&pose.turns).filter(|(limited, _)| limited.limits.are_finite())
+        {
             let of_dofs = &mut limiter.limited[limited.dofs()];
             if of_dofs.iter().all(Option::is_none) {
                 of_dofs.fill(limited.nearest(turn, dt));
