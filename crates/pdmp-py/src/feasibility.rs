@@ -75,6 +75,8 @@ impl Margins {
 impl Model {
     /// Compares the whole movement under constant conditions with limits.
     ///
+    /// Of a rotation, the sizes of angular velocity and acceleration count, under the index of its first degree of freedom.
+    ///
     /// A discrete movement counts from its start until it rests past its end, a rhythmic one over a period, and from a given
     /// start until it has reached its cycle.
     ///
