@@ -151,7 +151,7 @@ def test_commands_in_the_wrong_shape_are_refused(model: pdmp.Model) -> None:
 
 
 def test_limits_bound_the_size_of_angular_velocity_and_acceleration(model: pdmp.Model) -> None:
-    """A controller and the fastest movement keep |ω| and |ω̇|, whatever is commanded, and name the limit."""
+    """A controller and the fastest movement keep both limits under any commands, and name them."""
     free = [np.inf] * 3
     limits = pdmp.Limits(velocity=[*free, 2.0, 2.0, 2.0], acceleration=[*free, 15.0, 15.0, 15.0])
     conditions = model.conditions(2)
@@ -171,7 +171,7 @@ def test_limits_bound_the_size_of_angular_velocity_and_acceleration(model: pdmp.
     controller = model.controller(0.001, conditions, limits=limits)
     np.testing.assert_array_equal(controller.limits.velocity, limits.velocity)
     goal = model.goals[0].copy()
-    motion, named = [controller.velocity], set[str | None]()
+    motion, named = [controller.velocity.copy()], set[str | None]()
     for k in range(3000):
         if k == 300:
             goal[3:] = times(turn([0.0, 0.6, 0.8], 1.5), goal[3:])
@@ -179,7 +179,7 @@ def test_limits_bound_the_size_of_angular_velocity_and_acceleration(model: pdmp.
         measured = times(turn([1.0, 0.0, 0.0], 0.5), controller.position[3:])
         pushed = np.concatenate([controller.position[:3], measured])
         controller.step(measured=pushed if k % 500 == 400 else None)
-        motion.append(controller.velocity)
+        motion.append(controller.velocity.copy())
         named.add(controller.limited[5])
     assert named >= {None, "velocity", "acceleration"}
     assert size(np.array(motion)).max() <= 2.0
@@ -189,11 +189,18 @@ def test_limits_bound_the_size_of_angular_velocity_and_acceleration(model: pdmp.
 def test_limits_that_depend_on_a_frame_are_refused(model: pdmp.Model) -> None:
     """Unequal limits of the DoFs of a rotation, and limits of its position or jerk, are refused."""
     for limits, message in (
-        (pdmp.Limits(velocity=[1, 1, 1, 2, 2, 3]), "DoF 5: a limit of 3 for the velocity, of DoF 3 2"),
+        (
+            pdmp.Limits(velocity=[1, 1, 1, 2, 2, 3]),
+            "DoF 5: a limit of 3 for the velocity, of DoF 3 2",
+        ),
         (pdmp.Limits(position=(-3, 3)), "DoF 3: a rotation has no limit of the position"),
         (pdmp.Limits(acceleration=9, jerk=99), "DoF 3: a rotation has no limit of the jerk"),
     ):
-        for call in (model.fastest_tau, model.feasible, lambda limits: model.controller(limits=limits)):
+        for call in (
+            model.fastest_tau,
+            model.feasible,
+            lambda limits: model.controller(limits=limits),
+        ):
             with pytest.raises(ValueError, match=message):
                 call(limits)
 

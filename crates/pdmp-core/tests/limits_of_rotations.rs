@@ -78,7 +78,7 @@ impl Turn {
             let change = norm(minus(to.omega[frame], self.omega[frame])) - rounding;
             change / (acceleration * h) - 1.0
         };
-        // The sine of half an angle is below half of it; a command may express the same rotation anew, to rounding.
+        // The sine of half an angle is below half of it; a command may move a rotation by rounding errors.
         let turned = 2.0 * times(back(self.q), to.q)[1..].iter().map(|x| x * x).sum::<f64>().sqrt().min(1.0);
         let angle = (turned - 1e-13) / (velocity * h) - 1.0;
         let size = norm(to.omega[0]) / velocity - 1.0;

@@ -204,7 +204,7 @@ mod tests {
         }
     }
 
-    /// A motion faster than the limit slows with A in its direction, whatever is wanted.
+    /// A motion faster than the limit slows with A along its own axis.
     #[test]
     fn motion_beyond_the_limit_slows() {
         let limits = AngularLimits { velocity: 1.0, acceleration: 2.0 };
