@@ -168,6 +168,10 @@ def test_limits_bound_the_size_of_angular_velocity_and_acceleration(model: pdmp.
     assert size(fastest.acceleration).max() < 15.0 * 1.01
     assert angles(fastest.position[-1, 3:], trajectory.position[-1, 3:]) < 1e-3
 
+    near = model.nearest_feasible(limits, conditions, tau=0.97 * tau)
+    assert model.feasible(limits, near).feasible
+    assert not model.feasible(limits, conditions, tau=0.97 * tau).feasible
+
     controller = model.controller(0.001, conditions, limits=limits)
     np.testing.assert_array_equal(controller.limits.velocity, limits.velocity)
     goal = model.goals[0].copy()

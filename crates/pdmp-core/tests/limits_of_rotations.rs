@@ -13,7 +13,9 @@ use std::sync::{Arc, LazyLock};
 use common::*;
 use ndarray::{Array1, Array2, s};
 use pdmp_core::model::Frame;
-use pdmp_core::motion::{Coupling, Limit, Limits, Margins, TimeGrid, fastest, fastest_tau, feasible};
+use pdmp_core::motion::{
+    Coupling, Limit, Limits, Margins, TimeGrid, Vary, fastest, fastest_tau, feasible, nearest_feasible,
+};
 use pdmp_core::{Command, Conditions, Controller, Error, FitOptions, Kind, LimitError, Model, Status, fit, rollout};
 use poses::*;
 use random::Random;
@@ -280,6 +282,47 @@ fn fastest_tau_reaches_a_limit() {
             assert_eq!(margins.velocity.unwrap().dof, model.n_dofs() - 3);
         }
     }
+}
+
+/// Conditions nearest to infeasible ones keep the limits, and those between both do not; hopeless limits are named.
+#[test]
+fn nearest_feasible_conditions_keep_the_limits() {
+    let mut random = Random(6);
+    let model = &*SCREW;
+    let mut n_changed = 0;
+    for case in 0..12 {
+        let style: Vec<f64> = (0..model.n_styles()).map(|_| random.between(-2.0, 2.0)).collect();
+        let conditions = Conditions { style: Some(style.clone()), ..Conditions::default() };
+        let grid = TimeGrid { dt: 1e-3, duration: None };
+        let movement = rollout(model.primitive(), &conditions, grid).unwrap();
+        let [fast, hard] = peaks(&movement.velocity, &movement.acceleration);
+        let share = [random.between(0.9, 1.0), random.between(0.85, 1.1)];
+        let limits = angular(model, share[0] * fast, share[1] * hard);
+        let vary = [Vary::Style, Vary::Both, Vary::Goal][case % 3];
+        let found = match nearest_feasible(model, &limits, &conditions, vary) {
+            Ok(found) => found,
+            Err(error) => {
+                assert!(matches!(error, Error::Limits(LimitError::Infeasible { dof: 3, .. })), "{error}");
+                continue;
+            }
+        };
+        assert!(feasible(model.primitive(), &limits, &found).unwrap().is_feasible());
+        n_changed += 1;
+        if vary != Vary::Style {
+            continue;
+        }
+        let new = found.style.clone().unwrap();
+        for part in [0.5, 0.9, 0.99] {
+            let between = style.iter().zip(&new).map(|(from, to)| from + part * (to - from)).collect();
+            let between = Conditions { style: Some(between), ..Conditions::default() };
+            assert!(!feasible(model.primitive(), &limits, &between).unwrap().is_feasible(), "{case} {part}");
+        }
+    }
+    assert!(n_changed > 6, "{n_changed}");
+    let hopeless = angular(model, 0.01, 100.0);
+    let error = nearest_feasible(model, &hopeless, &Conditions::default(), Vary::Both).unwrap_err();
+    assert!(error.to_string().contains("DoF 3") && error.to_string().contains("velocity reaches"), "{error}");
+    assert!(error.to_string().contains("times as long"), "{error}");
 }
 
 /// The fastest movement keeps the limits, follows the path, and uses them: at almost every sample one of them is nearly reached.

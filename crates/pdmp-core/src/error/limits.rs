@@ -75,15 +75,6 @@ pub enum LimitError {
         /// That of the first DoF.
         expected: f64,
     },
-    /// A limit of a rotation in a search for conditions.
-    #[error(
-        "limits of DoF {dof}: no search keeps the size of an angular velocity or acceleration; give infinity for the DoFs of \
-         rotations, compare the movement with all limits (feasible), and slow it down (fastest_tau)"
-    )]
-    SearchOfRotation {
-        /// Index of the DoF.
-        dof: usize,
-    },
     /// A limit of the jerk without one of the acceleration.
     #[error(
         "limits of DoF {dof}: a jerk of {} needs a limit of the acceleration, which bounds the time of a reversal; give both",

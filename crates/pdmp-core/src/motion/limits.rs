@@ -121,13 +121,9 @@ impl Limits {
         Ok(())
     }
 
-    /// Refuses limits of rotations.
-    #[cfg(feature = "learning")]
-    pub(crate) fn refuse_rotations(&self, primitive: &Primitive) -> Result<()> {
-        match primitive.rotation_dofs().find(|&dof| self.of_rotation(dof).are_finite()) {
-            Some(dof) => Err(Error::Limits(LimitError::SearchOfRotation { dof })),
-            None => Ok(()),
-        }
+    /// Returns whether a rotation has limits.
+    pub(crate) fn bound_rotations(&self, primitive: &Primitive) -> bool {
+        primitive.rotation_dofs().any(|dof| self.of_rotation(dof).are_finite())
     }
 
     /// Returns the limits of the rotation whose first DoF is given.

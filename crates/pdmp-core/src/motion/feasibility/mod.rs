@@ -7,6 +7,8 @@ mod nearest;
 #[cfg(feature = "learning")]
 mod quadratic_program;
 mod sampling;
+#[cfg(feature = "learning")]
+mod turn_cuts;
 mod turning;
 #[cfg(feature = "learning")]
 mod variables;

@@ -19,6 +19,9 @@ use crate::motion::sampled_path::TurnDerivatives;
 use crate::motion::trajectory::Trajectory;
 use crate::numerics::rotation::{Vector, dot};
 
+/// Share of a limit that a search keeps free at the samples, which may be exceeded between them.
+#[cfg(feature = "learning")]
+pub(super) const SEARCH_MARGIN: f64 = 1e-5;
 /// Minimum length of a cell with extremes inside, relative to the duration, as for a DoF.
 const MIN_LENGTH: f64 = 1e-7;
 /// Maximum of s(1 − s)², the cubic of a slope at an end.
@@ -38,7 +41,7 @@ pub(super) fn compare(
     conditions: &Conditions,
     margins: &mut Margins,
 ) -> Result<()> {
-    if !primitive.rotation_dofs().any(|dof| limits.of_rotation(dof).are_finite()) {
+    if !limits.bound_rotations(primitive) {
         return Ok(());
     }
     let movement = rollout_at(primitive, conditions, times(primitive, conditions)?)?;
