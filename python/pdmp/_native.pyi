@@ -1013,7 +1013,9 @@ class Model:
         rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
         demonstrations plus squares of a tenth of the range of styles and positions, subject to the limits over the whole
         movement: a quadratic program. With `context`, the covariance is that of style and goal together in the prediction,
-        plus squares of a hundredth of the standard deviations above: what the context determines changes least.
+        plus squares of a hundredth of the standard deviations above: what the context determines changes least. The sizes of
+        angular velocities and accelerations are linearised: within limits of rotations the conditions are the nearest ones up to
+        their curvature.
 
         Parameters
         ----------
