@@ -142,14 +142,71 @@ def test_commands_in_the_wrong_shape_are_refused(model: pdmp.Model) -> None:
             model.rollouts(goal=np.stack([bad, bad]))
     with pytest.raises(ValueError, match="one value per DoF"):
         model.rollout(velocity=np.zeros(7))
-    with pytest.raises(ValueError, match="a rotation has no limits"):
-        model.controller(limits=pdmp.Limits(velocity=1.0))
     with pytest.raises(ValueError, match="bands do not exist"):
         model.band([0.1])
     with pytest.raises(ValueError, match="Jacobians of angular velocities"):
         model.jacobian("style", derivative=1)
     with pytest.raises(ValueError, match="time_scaling must be linear"):
         pdmp.fit(demonstrations(), alignment="warp")
+
+
+def test_limits_bound_the_size_of_angular_velocity_and_acceleration(model: pdmp.Model) -> None:
+    """A controller and the fastest movement keep both limits under any commands, and name them."""
+    free = [np.inf] * 3
+    limits = pdmp.Limits(velocity=[*free, 2.0, 2.0, 2.0], acceleration=[*free, 15.0, 15.0, 15.0])
+    conditions = model.conditions(2)
+    size = lambda rows: np.linalg.norm(rows[..., 3:], axis=-1)  # noqa: E731
+    trajectory = model.rollout(conditions, dt=0.001)
+    assert size(trajectory.velocity).max() > 4.0
+    ratio, dof, _ = model.feasible(limits, conditions).velocity
+    assert dof == 3
+    assert ratio == pytest.approx(size(trajectory.velocity).max() / 2.0, rel=1e-4)
+    tau = model.fastest_tau(limits, conditions)
+    assert model.feasible(limits, conditions, tau=tau).feasible
+    fastest = model.fastest(limits, conditions, dt=0.001)
+    assert size(fastest.velocity).max() < 2.0 * 1.005
+    assert size(fastest.acceleration).max() < 15.0 * 1.01
+    assert angles(fastest.position[-1, 3:], trajectory.position[-1, 3:]) < 1e-3
+
+    near = model.nearest_feasible(limits, conditions, tau=0.97 * tau)
+    assert model.feasible(limits, near).feasible
+    assert not model.feasible(limits, conditions, tau=0.97 * tau).feasible
+
+    controller = model.controller(0.001, conditions, limits=limits)
+    np.testing.assert_array_equal(controller.limits.velocity, limits.velocity)
+    goal = model.goals[0].copy()
+    motion, named = [controller.velocity.copy()], set[str | None]()
+    for k in range(3000):
+        if k == 300:
+            goal[3:] = times(turn([0.0, 0.6, 0.8], 1.5), goal[3:])
+            controller.goal, controller.tau = goal, 0.3 * model.tau
+        measured = times(turn([1.0, 0.0, 0.0], 0.5), controller.position[3:])
+        pushed = np.concatenate([controller.position[:3], measured])
+        controller.step(measured=pushed if k % 500 == 400 else None)
+        motion.append(controller.velocity.copy())
+        named.add(controller.limited[5])
+    assert named >= {None, "velocity", "acceleration"}
+    assert size(np.array(motion)).max() <= 2.0
+    assert size(np.diff(motion, axis=0)).max() <= 15.0 * 0.001 * (1 + 1e-9)
+
+
+def test_limits_that_depend_on_a_frame_are_refused(model: pdmp.Model) -> None:
+    """Unequal limits of the DoFs of a rotation, and limits of its position or jerk, are refused."""
+    for limits, message in (
+        (
+            pdmp.Limits(velocity=[1, 1, 1, 2, 2, 3]),
+            "DoF 5: a limit of 3 for the velocity, of DoF 3 2",
+        ),
+        (pdmp.Limits(position=(-3, 3)), "DoF 3: a rotation has no limit of the position"),
+        (pdmp.Limits(acceleration=9, jerk=99), "DoF 3: a rotation has no limit of the jerk"),
+    ):
+        for call in (
+            model.fastest_tau,
+            model.feasible,
+            lambda limits: model.controller(limits=limits),
+        ):
+            with pytest.raises(ValueError, match=message):
+                call(limits)
 
 
 def test_contexts_predict_rotations(model: pdmp.Model) -> None:

@@ -990,6 +990,8 @@ class Model:
     ) -> Margins:
         """Compares the whole movement under constant conditions with limits.
 
+        Of a rotation, the sizes of angular velocity and acceleration count, under the index of its first degree of freedom.
+
         A discrete movement counts from its start until it rests past its end, a rhythmic one over a period, and from a given
         start until it has reached its cycle.
 
@@ -1040,7 +1042,9 @@ class Model:
         rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
         demonstrations plus squares of a tenth of the range of styles and positions, subject to the limits over the whole
         movement: a quadratic program. With `context`, the covariance is that of style and goal together in the prediction,
-        plus squares of a hundredth of the standard deviations above: what the context determines changes least.
+        plus squares of a hundredth of the standard deviations above: what the context determines changes least. The sizes of
+        angular velocities and accelerations are linearised: within limits of rotations the conditions are the nearest ones up to
+        their curvature.
 
         Parameters
         ----------
@@ -1425,7 +1429,8 @@ class Model:
         """Computes the smallest constant tau with which a discrete movement keeps limits of velocity and acceleration.
 
         The path y(u) over the clock u = t / tau does not depend on tau. With ẏ = y′ / tau and ÿ = y″ / tau², the smallest
-        tau is max(max |y′| / V, √(max |y″| / A)) over degrees of freedom and time, until the movement rests past its end.
+        tau is max(max |y′| / V, √(max |y″| / A)) over degrees of freedom and time, until the movement rests past its end. Of a
+        rotation, the sizes of angular velocity and acceleration count.
 
         Parameters
         ----------
@@ -1474,7 +1479,8 @@ class Model:
         conditions, it starts or ends with that.
 
         Limits hold at the ends and in the middle of each thousandth of the path. In between, recordings exceed them by up to
-        0.5 %, paths with corners by 2 %; a controller with the limits keeps them at every tick.
+        0.5 %, paths with corners by 2 %; a controller with the limits keeps them at every tick. Where the axis of a rotation turns, up to
+        1.9 % of the limit of its angular acceleration remain unused.
 
         Parameters
         ----------
@@ -1734,6 +1740,9 @@ class Limits:
     Each limit is one number for all degrees of freedom or an array (D,); None and infinity are no limit.
     `Model.controller` keeps them at every tick, `Model.fastest` along a path, and `Model.fastest_tau` with a constant
     tau.
+
+    The three degrees of freedom of a rotation have equal limits, in rad/s and rad/s², of the sizes of its angular velocity and
+    acceleration, which depend on no frame; its position and jerk have none.
 
     Parameters
     ----------
@@ -2396,6 +2405,10 @@ class Controller:
         With a limit of the jerk, ÿ changes by at most J·dt, the degree of freedom can always stop inside, and a movement
         begins with ÿ = 0, or with the present ÿ if it goes on from the present position and velocity. Where a degree of freedom
         comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
+
+        The limits of a rotation are those of the sizes of its angular velocity and acceleration: at the end of every tick |ω| ≤ V and
+        |ω̇| ≤ A, over it a change of ω by at most A·dt in the frame of the tool and in that of the world, and a turn by at most V·dt. A limited
+        tick ends with the closest ω within them, and turns about a fixed axis.
 
         A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
         movement outside, after limits that shrink or at a start outside, brakes with A and returns at V or below. Along a path that

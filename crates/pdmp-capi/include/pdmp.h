@@ -227,7 +227,8 @@ typedef struct {
 } pdmp_motion;
 
 /// Limits of position, velocity, acceleration and jerk. Each member is one number for all DoFs or n_dofs numbers; `{NULL, 0}` and
-/// infinity are no limit.
+/// infinity are no limit. The three DoFs of a rotation have equal limits, in rad/s and rad/s^2, of the sizes of its angular velocity
+/// and acceleration, which depend on no frame; its position and jerk have none.
 typedef struct {
     /// Lower limits of the position (1) or (n_dofs), in the unit of each DoF; below the upper ones.
     pdmp_vector lower;
@@ -455,7 +456,8 @@ size_t pdmp_controller_error(const pdmp_controller *controller, pdmp_text text);
 /// is no single cubic. A motion inside the limits is not changed. With a limit of the jerk, the change of y'' is at most dt jerk, the DoF can always stop inside, and the
 /// cubic may pass the limit by dt^3 jerk / 150 where it comes to rest within a tick. A goal or anchor outside is moved to the limit, where a movement is finished as at any goal. A
 /// movement outside, after limits that shrink or at a start outside, brakes with the limit of the acceleration and
-/// returns at the limit of the velocity or below. The
+/// returns at the limit of the velocity or below. The angular velocity of a rotation changes by at most dt acceleration in
+/// the frame of the tool and in that of the world, and it turns by at most dt velocity. The
 /// limits stay in force after pdmp_controller_reset.
 ///
 /// This function allocates the first time, unless every DoF is limited on its own. Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE. The

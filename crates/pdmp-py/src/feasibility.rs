@@ -75,6 +75,8 @@ impl Margins {
 impl Model {
     /// Compares the whole movement under constant conditions with limits.
     ///
+    /// Of a rotation, the sizes of angular velocity and acceleration count, under the index of its first degree of freedom.
+    ///
     /// A discrete movement counts from its start until it rests past its end, a rhythmic one over a period, and from a given
     /// start until it has reached its cycle.
     ///
@@ -131,7 +133,9 @@ impl Model {
     /// rhythmic movement. The change (Δs, Δg) minimises Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg, with the covariances of the
     /// demonstrations plus squares of a tenth of the range of styles and positions, subject to the limits over the whole
     /// movement: a quadratic program. With `context`, the covariance is that of style and goal together in the prediction,
-    /// plus squares of a hundredth of the standard deviations above: what the context determines changes least.
+    /// plus squares of a hundredth of the standard deviations above: what the context determines changes least. The sizes of
+    /// angular velocities and accelerations are linearised: within limits of rotations the conditions are the nearest ones up to
+    /// their curvature.
     ///
     /// Parameters
     /// ----------

@@ -15,6 +15,9 @@ use crate::instance::{self, pair};
 /// `Model.controller` keeps them at every tick, `Model.fastest` along a path, and `Model.fastest_tau` with a constant
 /// tau.
 ///
+/// The three degrees of freedom of a rotation have equal limits, in rad/s and rad/s², of the sizes of its angular velocity and
+/// acceleration, which depend on no frame; its position and jerk have none.
+///
 /// Parameters
 /// ----------
 /// position : tuple of two float or array_like, (D,), optional
@@ -155,6 +158,10 @@ impl Controller {
     /// With a limit of the jerk, ÿ changes by at most J·dt, the degree of freedom can always stop inside, and a movement
     /// begins with ÿ = 0, or with the present ÿ if it goes on from the present position and velocity. Where a degree of freedom
     /// comes to rest within a tick, the cubic may pass the limit by J·dt³/150.
+    ///
+    /// The limits of a rotation are those of the sizes of its angular velocity and acceleration: at the end of every tick |ω| ≤ V and
+    /// |ω̇| ≤ A, over it a change of ω by at most A·dt in the frame of the tool and in that of the world, and a turn by at most V·dt. A limited
+    /// tick ends with the closest ω within them, and turns about a fixed axis.
     ///
     /// A goal or anchor outside is moved to the limit: `goal` and `anchor` return it, and a movement finishes there. A
     /// movement outside, after limits that shrink or at a start outside, brakes with A and returns at V or below. Along a path that

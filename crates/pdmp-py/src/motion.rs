@@ -147,7 +147,8 @@ impl Model {
     /// Computes the smallest constant tau with which a discrete movement keeps limits of velocity and acceleration.
     ///
     /// The path y(u) over the clock u = t / tau does not depend on tau. With ẏ = y′ / tau and ÿ = y″ / tau², the smallest
-    /// tau is max(max |y′| / V, √(max |y″| / A)) over degrees of freedom and time, until the movement rests past its end.
+    /// tau is max(max |y′| / V, √(max |y″| / A)) over degrees of freedom and time, until the movement rests past its end. Of a
+    /// rotation, the sizes of angular velocity and acceleration count.
     ///
     /// Parameters
     /// ----------
@@ -202,7 +203,8 @@ impl Model {
     /// conditions, it starts or ends with that.
     ///
     /// Limits hold at the ends and in the middle of each thousandth of the path. In between, recordings exceed them by up to
-    /// 0.5 %, paths with corners by 2 %; a controller with the limits keeps them at every tick.
+    /// 0.5 %, paths with corners by 2 %; a controller with the limits keeps them at every tick. Where the axis of a rotation turns, up to
+    /// 1.9 % of the limit of its angular acceleration remain unused.
     ///
     /// Parameters
     /// ----------

@@ -45,14 +45,35 @@ pub enum LimitError {
         /// Rate at the start, relative to the largest admissible one.
         ratio: f64,
     },
-    /// A limit of a rotation.
+    /// A limit of the position or jerk of a rotation.
     #[error(
-        "limits of DoF {dof}: a rotation has no limits; give infinity for its three DoFs, and limit angular velocities in the \
-         driver of the robot"
+        "limits of DoF {dof}: a rotation has no limit of the {quantity}; give infinity for its three DoFs, and limit its angular \
+         velocity and acceleration"
     )]
     OfRotation {
         /// Index of the DoF.
         dof: usize,
+        /// Position or jerk.
+        quantity: &'static str,
+    },
+    /// Limits of the three DoFs of a rotation that are not equal.
+    #[error(
+        "limits of DoF {dof}: a limit of {} for the {quantity}, of DoF {first} {}; both are DoFs of one rotation, and its limit bounds \
+         the size of the angular {quantity}, which depends on no frame: give equal numbers",
+        Number(*limit),
+        Number(*expected)
+    )]
+    UnequalOfRotation {
+        /// Index of the DoF.
+        dof: usize,
+        /// Index of the first DoF of the rotation.
+        first: usize,
+        /// Velocity or acceleration.
+        quantity: &'static str,
+        /// Its limit.
+        limit: f64,
+        /// That of the first DoF.
+        expected: f64,
     },
     /// A limit of the jerk without one of the acceleration.
     #[error(

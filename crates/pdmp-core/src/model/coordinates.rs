@@ -16,7 +16,8 @@ use crate::kind::Kind;
 use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::numerics::rotation::{
-    Quaternion, Turning, Vector, exp, inverse, inverse_jacobian, jacobian, log_near, on_side_of, product, rotate,
+    Quaternion, Turning, Vector, add_scaled, exp, inverse, inverse_jacobian, jacobian, log_near, on_side_of, product,
+    rotate,
 };
 use crate::validate::check_vector;
 
@@ -83,6 +84,28 @@ impl Rotation {
     #[inline(always)]
     fn write(&self, vector: Vector, dofs: &mut [f64]) {
         dofs[self.dof..self.dof + 3].copy_from_slice(&vector);
+    }
+
+    /// Returns the motion at clock `u`, with u̇ and ü, for that of the DoFs.
+    #[inline(always)]
+    pub(crate) fn motion(&self, u: f64, [rate, rate_change]: [f64; 2], dofs: [&[f64]; 3]) -> Turning {
+        let mean = self.mean.at(u);
+        let mean = Turning {
+            velocity: mean.velocity.map(|x| x * rate),
+            acceleration: std::array::from_fn(|i| {
+                mean.acceleration[i] * (rate * rate) + mean.velocity[i] * rate_change
+            }),
+            ..mean
+        };
+        mean.times_exp(dofs.map(|dofs| self.read(dofs)))
+    }
+
+    /// Returns δ and δ̇ of a motion at clock `u`, for the rate of the mean rotation. δ is that closest to `near`.
+    pub(crate) fn residual(&self, u: f64, rate: f64, motion: &Turning, near: Vector) -> [Vector; 2] {
+        let mean = self.mean.at(u);
+        let delta = log_near(product(inverse(mean.rotation), motion.rotation), near);
+        let carried = rotate(inverse(exp(delta)), mean.velocity);
+        [delta, inverse_jacobian(delta, add_scaled(motion.velocity, -rate, carried))]
     }
 }
 
@@ -193,7 +216,22 @@ impl Coordinates {
     pub(crate) fn motion(
         &self,
         u: f64,
-        [rate, rate_change]: [f64; 2],
+        rates: [f64; 2],
+        dofs: [&[f64]; 3],
+        position: &mut [f64],
+        velocity: &mut [f64],
+        acceleration: &mut [f64],
+    ) {
+        self.write_plain(dofs, position, velocity, acceleration);
+        for rotation in &self.rotations {
+            self.write(rotation, rotation.motion(u, rates, dofs), position, velocity, acceleration);
+        }
+    }
+
+    /// Writes the motion of the DoFs that are no part of a rotation.
+    #[inline(always)]
+    pub(crate) fn write_plain(
+        &self,
         dofs: [&[f64]; 3],
         position: &mut [f64],
         velocity: &mut [f64],
@@ -204,24 +242,27 @@ impl Coordinates {
             velocity[dof] = dofs[1][dof];
             acceleration[dof] = dofs[2][dof];
         }
-        for rotation in &self.rotations {
-            let mean = rotation.mean.at(u);
-            let mean = Turning {
-                velocity: mean.velocity.map(|x| x * rate),
-                acceleration: std::array::from_fn(|i| {
-                    mean.acceleration[i] * (rate * rate) + mean.velocity[i] * rate_change
-                }),
-                ..mean
-            };
-            let mut moved = mean.times_exp(dofs.map(|dofs| rotation.read(dofs)));
-            if self.frame == Frame::World {
-                moved.velocity = rotate(moved.rotation, moved.velocity);
-                moved.acceleration = rotate(moved.rotation, moved.acceleration);
-            }
-            rotation.columns.write(on_side_of(moved.rotation, rotation.columns.read(position)), position);
-            rotation.write(moved.velocity, velocity);
-            rotation.write(moved.acceleration, acceleration);
+    }
+
+    /// Writes the motion of a rotation, in the body frame, to position, velocity and acceleration in that of the coordinates.
+    ///
+    /// A quaternion has the sign closer to that in `position` on entry.
+    #[inline(always)]
+    pub(crate) fn write(
+        &self,
+        rotation: &Rotation,
+        mut moved: Turning,
+        position: &mut [f64],
+        velocity: &mut [f64],
+        acceleration: &mut [f64],
+    ) {
+        if self.frame == Frame::World {
+            moved.velocity = rotate(moved.rotation, moved.velocity);
+            moved.acceleration = rotate(moved.rotation, moved.acceleration);
         }
+        rotation.columns.write(on_side_of(moved.rotation, rotation.columns.read(position)), position);
+        rotation.write(moved.velocity, velocity);
+        rotation.write(moved.acceleration, acceleration);
     }
 
     /// Converts velocities to those of the DoFs at `dofs` and clock `u`, J⁻¹(δ)ω, without the motion of the mean rotation.

@@ -11,7 +11,7 @@ use crate::motion::controller::Controller;
 use crate::motion::feasibility::slowdown;
 use crate::motion::limits::Limits;
 use crate::motion::sampled_path::{Derivatives, SampledPath};
-use crate::motion::time_law::{RateCurve, RateLimits, TimeLaw};
+use crate::motion::time_law::{PathLimits, RateCurve, TimeLaw};
 use crate::motion::trajectory::{Trajectory, step_count};
 use crate::numerics::simd::{Kernel, Register, WIDTH, compute, groups, pack, unpad};
 use crate::validate::check_positive;
@@ -30,14 +30,14 @@ const MAX_RATE: f64 = 1e4;
 ///
 /// # Errors
 /// Limits that do not fit, or neither of both.
-fn rate_limits(limits: &Limits, primitive: &Primitive) -> Result<Vec<RateLimits>> {
+fn rate_limits(limits: &Limits, primitive: &Primitive) -> Result<PathLimits> {
     limits.check_rotations(primitive)?;
     let n_dofs = primitive.n_dofs();
     if !limits.bound_rates(n_dofs) {
         let problem = "bound neither velocity nor acceleration: give one of them, or the movement takes no time";
         return Err(Error::Argument { name: "limits", problem });
     }
-    Ok(limits.rates(n_dofs))
+    Ok(limits.along_path(primitive))
 }
 
 /// Returns the conditions at the τ of the primitive on the same path.
@@ -61,7 +61,7 @@ fn on_path(primitive: &Primitive, conditions: &Conditions) -> Result<Conditions>
 
 /// Returns the path under conditions of [`on_path`]. The first and the last interval are halved again and again towards the
 /// ends, where the rate of a movement from rest to rest changes without bound per clock.
-fn path(primitive: &Arc<Primitive>, conditions: &Conditions) -> Result<SampledPath> {
+fn path(primitive: &Arc<Primitive>, conditions: &Conditions, limits: &PathLimits) -> Result<SampledPath> {
     let extent = primitive.canonical().extent();
     let interval = extent / N_INTERVALS as f64;
     let halved = |k: i32| interval * 0.5f64.powi(k);
@@ -70,13 +70,15 @@ fn path(primitive: &Arc<Primitive>, conditions: &Conditions) -> Result<SampledPa
         .chain((1..N_INTERVALS).map(|i| interval * i as f64))
         .chain((1..=N_HALVINGS).map(|k| extent - halved(k)))
         .chain(std::iter::once(extent * (1.0 - KINK)));
-    let mut path = SampledPath::at(knots.collect(), groups(primitive.n_dofs()));
+    let mut path = SampledPath::at(knots.collect(), groups(primitive.n_dofs()), limits.rotations.len());
+    path.sample_turns(limits);
     Controller::new(primitive, primitive.tau(), conditions, Some(0.0))?.sample_path(&mut path);
     Ok(path)
 }
 
 /// Returns the smallest constant τ with which the movement keeps its limits of velocity and acceleration, in seconds:
-/// max(max|y′|/V, √(max|y″|/A)) over DoFs and the whole movement, until it rests past its end.
+/// max(max|y′|/V, √(max|y″|/A)) over DoFs and the whole movement, until it rests past its end; of a rotation with the sizes of
+/// its angular velocity and acceleration.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit, rollout};
@@ -105,7 +107,8 @@ pub fn fastest_tau(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Con
 ///
 /// It begins and ends at rest; with a `velocity` or `goal_velocity` in the conditions it begins or ends with that. Limits hold
 /// at the ends and in the middle of each thousandth of the path. In between, recordings exceed them by up to 0.5 %, paths with
-/// corners by 2 %; a controller with the limits keeps them at every tick.
+/// corners by 2 %; a controller with the limits keeps them at every tick. Where the axis of a rotation turns, up to 1.9 % of the limit
+/// of its angular acceleration remain unused.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
@@ -131,9 +134,9 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
     let [start, end] =
         [&conditions.velocity, &conditions.goal_velocity].map(|v| if given(v) { commanded } else { 0.0 });
     let conditions = on_path(primitive, conditions)?;
-    let path = path(primitive, &conditions)?;
+    let path = path(primitive, &conditions, &bounds)?;
     check_positions(&path, limits, primitive)?;
-    let mut curve = RateCurve::new(path.clock.len(), bounds.len());
+    let mut curve = RateCurve::new(path.clock.len(), bounds.groups.len(), bounds.rotations.len());
     curve.compute(&path, &bounds, end, (MAX_RATE / primitive.tau()).powi(2));
     if start > curve.max[0] * (1.0 + 1e-9) {
         return Err(Error::Limits(LimitError::StartTooFast { ratio: (start / curve.max[0]).sqrt() }));

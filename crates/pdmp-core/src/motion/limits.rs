@@ -2,11 +2,15 @@
 
 use crate::error::{Error, LimitError, Result};
 use crate::model::Primitive;
-use crate::motion::time_law::RateLimits;
+use crate::motion::angular::AngularLimits;
+use crate::motion::time_law::{PathLimits, RateLimits};
 use crate::numerics::simd::{F64x4, WIDTH, groups};
 use crate::validate::MAX_MAGNITUDE;
 
 /// Limits of position, velocity, acceleration and jerk: one number for all DoFs, or one for each. `None` or infinity is no limit.
+///
+/// The three DoFs of a rotation have equal limits Ω and A, in rad/s and rad/s², which bound the sizes of its angular velocity and
+/// acceleration, |ω| ≤ Ω and |ω̇| ≤ A: they depend on no frame. Its position and jerk have no limits.
 ///
 /// ```
 /// use pdmp_core::motion::Limits;
@@ -93,19 +97,52 @@ impl Limits {
         })
     }
 
-    /// Refuses limits of rotations: their angular velocity is not that of a degree of freedom.
+    /// Checks limits for a primitive: those of a rotation bound the sizes of its angular velocity and acceleration.
+    ///
+    /// # Errors
+    /// As for [`Limits::check`], a limit of the position or jerk of a rotation, or different limits of its three DoFs.
     pub(crate) fn check_rotations(&self, primitive: &Primitive) -> Result<()> {
         self.check(primitive.n_dofs())?;
-        let finite = |dof: usize| {
-            let limits = [(&self.lower, f64::NEG_INFINITY)];
-            let others =
-                [&self.upper, &self.velocity, &self.acceleration, &self.jerk].map(|limits| (limits, f64::INFINITY));
-            limits.into_iter().chain(others).any(|(limits, none)| limit_of_dof(limits, dof, none).is_finite())
-        };
-        match primitive.rotation_dofs().flat_map(|first| first..first + 3).find(|&dof| finite(dof)) {
-            Some(dof) => Err(Error::Limits(LimitError::OfRotation { dof })),
-            None => Ok(()),
+        for first in primitive.rotation_dofs() {
+            let refused = [("position", &self.lower), ("position", &self.upper), ("jerk", &self.jerk)];
+            for (dof, (quantity, limits)) in (first..first + 3).flat_map(|dof| refused.map(|refused| (dof, refused))) {
+                if limit_of_dof(limits, dof, f64::INFINITY).is_finite() {
+                    return Err(Error::Limits(LimitError::OfRotation { dof, quantity }));
+                }
+            }
+            for (quantity, limits) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {
+                let limit = |dof: usize| limit_of_dof(limits, dof, f64::INFINITY);
+                if let Some(dof) = (first + 1..first + 3).find(|&dof| limit(dof) != limit(first)) {
+                    let (limit, expected) = (limit(dof), limit(first));
+                    return Err(Error::Limits(LimitError::UnequalOfRotation { dof, first, quantity, limit, expected }));
+                }
+            }
         }
+        Ok(())
+    }
+
+    /// Returns whether a rotation has limits.
+    pub(crate) fn bound_rotations(&self, primitive: &Primitive) -> bool {
+        primitive.rotation_dofs().any(|dof| self.of_rotation(dof).are_finite())
+    }
+
+    /// Returns the limits of the rotation whose first DoF is given.
+    pub(crate) fn of_rotation(&self, dof: usize) -> AngularLimits {
+        let [velocity, acceleration] =
+            [&self.velocity, &self.acceleration].map(|limits| limit_of_dof(limits, dof, f64::INFINITY));
+        AngularLimits { velocity, acceleration }
+    }
+
+    /// Returns the limits with none for the DoFs of rotations.
+    pub(crate) fn of_plain_dofs(&self, primitive: &Primitive) -> Self {
+        let mut plain = self.clone();
+        for limits in [&mut plain.velocity, &mut plain.acceleration].into_iter().flatten() {
+            if let [limit] = limits[..] {
+                limits.resize(primitive.n_dofs(), limit);
+            }
+            primitive.rotation_dofs().for_each(|first| limits[first..first + 3].fill(f64::INFINITY));
+        }
+        plain
     }
 
     /// Returns the lower and upper limits of the position, infinite where there is none.
@@ -113,8 +150,14 @@ impl Limits {
         [of_dofs(&self.lower, f64::NEG_INFINITY, n_dofs), of_dofs(&self.upper, f64::INFINITY, n_dofs)]
     }
 
+    /// Returns the limits of velocity and acceleration along a path, infinite where there is none.
+    pub(crate) fn along_path(&self, primitive: &Primitive) -> PathLimits {
+        let rotations = primitive.rotation_dofs().map(|first| self.of_rotation(first)).collect();
+        PathLimits { groups: self.of_plain_dofs(primitive).rates(primitive.n_dofs()), rotations }
+    }
+
     /// Returns the limits of velocity and acceleration by groups, infinite where there is none.
-    pub(crate) fn rates(&self, n_dofs: usize) -> Vec<RateLimits> {
+    fn rates(&self, n_dofs: usize) -> Vec<RateLimits> {
         let lanes = |limits: &Option<Vec<f64>>, group: usize| {
             F64x4::new(std::array::from_fn(|lane| {
                 let dof = group * WIDTH + lane;

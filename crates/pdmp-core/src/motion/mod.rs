@@ -1,5 +1,6 @@
 //! Motion generation: the control loop, rollouts, batches of rollouts and their derivatives.
 
+pub(crate) mod angular;
 pub(crate) mod batch;
 pub(crate) mod batch_conditions;
 pub(crate) mod command;

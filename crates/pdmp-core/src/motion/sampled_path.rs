@@ -1,6 +1,8 @@
 //! Path of a movement, sampled at knots of the clock.
 
-use crate::motion::time_law::RateLimits;
+use crate::motion::angular::AngularLimits;
+use crate::motion::time_law::{PathLimits, RateLimits};
+use crate::numerics::rotation::{Vector, add_scaled};
 use crate::numerics::simd::{F64x4, Register};
 use crate::numerics::state::clone_in_place;
 
@@ -12,14 +14,44 @@ pub(crate) struct SampledPath {
     n_groups: usize,
     /// y, y′ and y″ (N + 1, groups of DoFs) by rows.
     samples: Vec<[F64x4; 3]>,
+    n_rotations: usize,
+    /// Angular velocity and acceleration per unit of the clock (N + 1, rotations) by rows, in the body frame.
+    turns: Vec<TurnDerivatives>,
+    /// True if the rotations are sampled.
+    has_turns: bool,
 }
 
-clone_in_place!(SampledPath { clock, n_groups, samples });
+clone_in_place!(SampledPath { clock, n_groups, samples, n_rotations, turns, has_turns });
 
 impl SampledPath {
-    /// Returns a path at knots that has not been sampled yet.
-    pub(crate) fn at(clock: Vec<f64>, n_groups: usize) -> Self {
-        Self { samples: vec![[F64x4::ZERO; 3]; clock.len() * n_groups], n_groups, clock }
+    /// Returns a path of groups of DoFs and rotations at knots that has not been sampled yet.
+    pub(crate) fn at(clock: Vec<f64>, n_groups: usize, n_rotations: usize) -> Self {
+        let samples = vec![[F64x4::ZERO; 3]; clock.len() * n_groups];
+        let turns = vec![TurnDerivatives::default(); clock.len() * n_rotations];
+        Self { samples, n_groups, n_rotations, turns, has_turns: false, clock }
+    }
+
+    /// Sets whether the rotations are sampled, for limits along the path.
+    pub(crate) fn sample_turns(&mut self, limits: &PathLimits) {
+        self.has_turns = limits.have_rotations();
+    }
+
+    /// Returns the samples of the rotations at a knot; none where they are not sampled.
+    pub(crate) fn turns_mut(&mut self, index: usize) -> &mut [TurnDerivatives] {
+        let n = if self.has_turns { self.n_rotations } else { 0 };
+        &mut self.turns[index * n..(index + 1) * n]
+    }
+
+    /// Returns the samples of the rotations at both ends of interval `index`, with their limits; none without limits of rotations.
+    #[inline(always)]
+    pub(crate) fn turns<'a>(
+        &'a self,
+        index: usize,
+        limits: &'a PathLimits,
+    ) -> impl Iterator<Item = ([TurnDerivatives; 2], &'a AngularLimits)> {
+        let n = if self.has_turns { self.n_rotations } else { 0 };
+        let turns = &self.turns[index * n..(index + 2) * n];
+        limits.rotations.iter().take(n).enumerate().map(move |(i, limits)| ([turns[i], turns[i + n]], limits))
     }
 
     /// Returns the samples of all groups at a knot.
@@ -27,9 +59,9 @@ impl SampledPath {
         &self.samples[index * self.n_groups..(index + 1) * self.n_groups]
     }
 
-    /// Returns the clock and the samples of each knot.
-    pub(crate) fn knots_mut(&mut self) -> impl Iterator<Item = (f64, &mut [[F64x4; 3]])> {
-        self.clock.iter().copied().zip(self.samples.chunks_exact_mut(self.n_groups))
+    /// Returns the samples of all groups at a knot, to be set.
+    pub(crate) fn knot_mut(&mut self, index: usize) -> &mut [[F64x4; 3]] {
+        &mut self.samples[index * self.n_groups..(index + 1) * self.n_groups]
     }
 
     /// Returns the length of interval `index`, between this knot and the next.
@@ -43,11 +75,11 @@ impl SampledPath {
     pub(crate) fn ends<'a>(
         &'a self,
         index: usize,
-        limits: &'a [RateLimits],
+        limits: &'a PathLimits,
     ) -> impl Iterator<Item = ([&'a [F64x4; 3]; 2], &'a RateLimits)> {
         let n_groups = self.n_groups;
         let samples = &self.samples[index * n_groups..(index + 2) * n_groups];
-        let limits = &limits[..n_groups];
+        let limits = &limits.groups[..n_groups];
         (0..n_groups).map(move |group| ([&samples[group], &samples[group + n_groups]], &limits[group]))
     }
 }
@@ -88,5 +120,27 @@ impl<T: Register> Derivatives<T> {
     fn cubic(self, next: Self, interval: f64) -> [T; 3] {
         let (change, bends) = (next.slope - self.slope, [self.bend * interval, next.bend * interval]);
         [bends[0], change * 3.0 - bends[0] * 2.0 - bends[1], bends[0] + bends[1] - change * 2.0]
+    }
+}
+
+/// Angular velocity and acceleration of a rotation per unit of the clock, in the body frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TurnDerivatives {
+    pub(crate) slope: Vector,
+    pub(crate) bend: Vector,
+}
+
+impl TurnDerivatives {
+    /// Returns those at a position `t` from 0 to 1 in an interval, as [`Derivatives::between`].
+    #[inline(always)]
+    pub(crate) fn between(&self, next: &Self, interval: f64, t: f64) -> Self {
+        let change = add_scaled(next.slope, -1.0, self.slope);
+        let [from, to] = [self.bend, next.bend].map(|bend| bend.map(|x| x * interval));
+        let c: Vector = std::array::from_fn(|i| change[i] * 3.0 - from[i] * 2.0 - to[i]);
+        let d: Vector = std::array::from_fn(|i| from[i] + to[i] - change[i] * 2.0);
+        Self {
+            slope: std::array::from_fn(|i| self.slope[i] + (from[i] + (c[i] + d[i] * t) * t) * t),
+            bend: std::array::from_fn(|i| (from[i] + (c[i] * 2.0 + d[i] * (3.0 * t)) * t) * interval.recip()),
+        }
     }
 }

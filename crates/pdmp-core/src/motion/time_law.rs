@@ -7,13 +7,19 @@
 //! |y′| √x ≤ V,    |y″x + y′a| ≤ A at both ends and in the middle of each interval.
 //! ```
 //!
+//! A rotation has |ω′|√x ≤ Ω and |ω″x + ω′a| ≤ A with the sizes of vectors. In the plane of ω′ and ω″ the latter is a disc, of which
+//! x ≥ 0 needs one half; the regular polygon with 16 corners on the circle replaces it. Without curvature, and for a = 0 with ω″ ⟂ ω′,
+//! it is exact; elsewhere up to 1.9 % of A remain unused.
+//!
 //! A backward pass computes the largest x from which the rest of the path can be followed, a forward pass takes the largest
 //! a that stays below it: O(N·D).
 //!
 //! H. Pham, Q.-C. Pham, *A new approach to time-optimal path parameterization based on reachability analysis*, IEEE
 //! Transactions on Robotics 34(3), 2018.
 
-use crate::motion::sampled_path::{Derivatives, SampledPath};
+use crate::motion::angular::AngularLimits;
+use crate::motion::sampled_path::{Derivatives, SampledPath, TurnDerivatives};
+use crate::numerics::rotation::{cross, dot};
 use crate::numerics::simd::{F64x4, Kernel, Register, compute};
 use crate::numerics::state::clone_in_place;
 
@@ -23,6 +29,23 @@ const MAX_NEWTON_STEPS: usize = 64;
 const MIN_BETA: f64 = 1e-200;
 /// Maximum number of rows of an interval for each group.
 const MAX_ROWS: usize = 5;
+/// Number of groups of four sides of the polygon for a rotation.
+const SIDE_GROUPS: usize = 2;
+/// Maximum number of rows of an interval for each rotation.
+const MAX_TURN_ROWS: usize = SIDE_GROUPS * MAX_ROWS;
+/// Cosine and sine of the normals of the sides, at odd multiples of π/16: ω′ points to a corner.
+const NORMALS: [[[f64; 4]; 2]; SIDE_GROUPS] = [
+    [
+        [0.980_785_280_403_230_4, 0.831_469_612_302_545_2, 0.555_570_233_019_602_2, 0.195_090_322_016_128_27],
+        [0.195_090_322_016_128_27, 0.555_570_233_019_602_2, 0.831_469_612_302_545_2, 0.980_785_280_403_230_4],
+    ],
+    [
+        [-0.195_090_322_016_128_27, -0.555_570_233_019_602_2, -0.831_469_612_302_545_2, -0.980_785_280_403_230_4],
+        [0.980_785_280_403_230_4, 0.831_469_612_302_545_2, 0.555_570_233_019_602_2, 0.195_090_322_016_128_27],
+    ],
+];
+/// Distance of the sides from the centre of a circle of radius 1, cos(π/16).
+const SIDE: f64 = 0.980_785_280_403_230_4;
 /// Number of intervals from a reversal of a DoF within which its limits also hold in the quarters of an interval.
 const REVERSAL: f64 = 4.0;
 
@@ -55,6 +78,45 @@ impl RateLimits {
     }
 }
 
+/// Limits along a path.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PathLimits {
+    pub(crate) groups: Vec<RateLimits>,
+    /// Limits of the rotations, empty for a primitive without.
+    pub(crate) rotations: Vec<AngularLimits>,
+}
+
+impl PathLimits {
+    /// Returns whether a rotation has limits.
+    pub(crate) fn have_rotations(&self) -> bool {
+        self.rotations.iter().any(AngularLimits::are_finite)
+    }
+}
+
+/// Returns the inverse of the largest x = ρ² that the limit of an angular velocity admits.
+#[inline(always)]
+pub(crate) fn of_angular_velocity(limits: &AngularLimits, slope: [f64; 3]) -> f64 {
+    dot(slope, slope) / (limits.velocity * limits.velocity)
+}
+
+/// Returns the inverse of the largest x with a = 0 that both limits of a rotation admit.
+#[inline(always)]
+fn of_constant_turn(limits: &AngularLimits, TurnDerivatives { slope, bend }: &TurnDerivatives) -> f64 {
+    of_angular_velocity(limits, *slope).max(dot(*bend, *bend).sqrt() / limits.acceleration)
+}
+
+/// Returns |β|, α along β and α across it, for α = ω″ and β = ω′ + `twice`·ω″.
+#[inline(always)]
+pub(crate) fn in_plane(TurnDerivatives { slope, bend }: &TurnDerivatives, twice: f64) -> [f64; 3] {
+    let beta: [f64; 3] = std::array::from_fn(|i| slope[i] + twice * bend[i]);
+    let (length, across) = (dot(beta, beta).sqrt(), cross(*bend, beta));
+    if length > 0.0 {
+        [length, dot(*bend, beta) / length, dot(across, across).sqrt() / length]
+    } else {
+        [0.0, 0.0, dot(*bend, *bend).sqrt()]
+    }
+}
+
 /// Limits |αx + βa| ≤ A of a group, as −α/β and A/|β|: a lies between slope·x − half and slope·x + half.
 #[derive(Clone, Copy, Debug)]
 struct Row<T> {
@@ -69,6 +131,17 @@ impl<T: Register> Row<T> {
         // For β = 0 the ends become steep lines instead of a bound of x.
         let inverse = T::splat(1.0) / (slope + bend * twice + T::splat(MIN_BETA));
         Self { slope: -bend * inverse, half: acceleration * inverse.abs() }
+    }
+
+    /// Returns the limits of a rotation as those of the sides of the polygon.
+    #[inline(always)]
+    fn of_turn(turn: &TurnDerivatives, acceleration: f64, twice: f64) -> [Self; SIDE_GROUPS] {
+        let [beta, along, across] = in_plane(turn, twice);
+        NORMALS.map(|[cosine, sine]| {
+            let [cosine, sine] = [cosine, sine].map(|x| T::load(&F64x4::new(x)));
+            let side = Derivatives { slope: cosine * beta, bend: cosine * along + sine * across };
+            Self::new(side, T::splat(SIDE * acceleration), 0.0)
+        })
     }
 
     #[inline(always)]
@@ -89,7 +162,7 @@ type Line = [f64; 2];
 /// Limits of one interval.
 #[derive(Debug, Default)]
 struct IntervalLimits {
-    /// Memory of five rows for each group.
+    /// Memory of five rows for each group, and of ten for each rotation.
     rows: Vec<Row<F64x4>>,
     n_rows: usize,
     /// Largest x at the start due to the limits of the velocity there.
@@ -103,13 +176,7 @@ clone_in_place!(IntervalLimits { rows, n_rows, most, middle });
 impl IntervalLimits {
     /// Visits the rows of interval `i`, and computes the limits of the velocity.
     #[inline(always)]
-    fn visit<T: Register>(
-        &mut self,
-        path: &SampledPath,
-        limits: &[RateLimits],
-        i: usize,
-        mut visit: impl FnMut(Row<T>),
-    ) {
+    fn visit<T: Register>(&mut self, path: &SampledPath, limits: &PathLimits, i: usize, mut visit: impl FnMut(Row<T>)) {
         let interval = path.interval(i);
         let [mut at_start, mut in_middle] = [T::default(); 2];
         for (ends, limits) in path.ends(i, limits) {
@@ -128,13 +195,31 @@ impl IntervalLimits {
                 visit(Row::new(here.between(next, interval, 0.75), acceleration, 1.5 * interval));
             }
         }
-        self.most = largest(at_start).recip();
-        self.middle = [(largest(in_middle) * interval).recip(), -interval.recip()];
+        let mut by_turns = [0.0f64; 2];
+        for ([here, next], limits) in path.turns(i, limits) {
+            let middle = here.between(&next, interval, 0.5);
+            let at = [&here, &middle].map(|turn| of_angular_velocity(limits, turn.slope));
+            by_turns = [by_turns[0].max(at[0]), by_turns[1].max(at[1])];
+            let mut visit_turn = |turn: &TurnDerivatives, twice: f64| {
+                Row::of_turn(turn, limits.acceleration, twice).into_iter().for_each(&mut visit);
+            };
+            visit_turn(&here, 0.0);
+            visit_turn(&middle, interval);
+            visit_turn(&next, 2.0 * interval);
+            let [slopes, bends] =
+                [[here.slope, next.slope], [here.bend, next.bend]].map(|ends| ends.map(|v| dot(v, v).sqrt()));
+            if bends[0].max(bends[1]) * (REVERSAL * interval) > slopes[0].min(slopes[1]) {
+                visit_turn(&here.between(&next, interval, 0.25), 0.5 * interval);
+                visit_turn(&here.between(&next, interval, 0.75), 1.5 * interval);
+            }
+        }
+        self.most = largest(at_start).max(by_turns[0]).recip();
+        self.middle = [(largest(in_middle).max(by_turns[1]) * interval).recip(), -interval.recip()];
     }
 
     /// Computes the limits of interval `i`.
     #[inline(always)]
-    fn compute<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize) {
+    fn compute<T: Register>(&mut self, path: &SampledPath, limits: &PathLimits, i: usize) {
         let (mut rows, mut n_rows) = (std::mem::take(&mut self.rows), 0);
         self.visit(path, limits, i, |Row::<T> { slope, half }| {
             rows[n_rows] = Row { slope: slope.store(), half: half.store() };
@@ -145,7 +230,7 @@ impl IntervalLimits {
 
     /// Returns the largest a of interval `i` for a given x at its start.
     #[inline(always)]
-    fn largest_slope<T: Register>(&mut self, path: &SampledPath, limits: &[RateLimits], i: usize, x: f64) -> f64 {
+    fn largest_slope<T: Register>(&mut self, path: &SampledPath, limits: &PathLimits, i: usize, x: f64) -> f64 {
         let mut upper = T::splat(f64::INFINITY);
         self.visit(path, limits, i, |row| upper = upper.fast_min(row.upper(x)));
         upper.smallest().min(self.middle[0] + self.middle[1] * x)
@@ -224,25 +309,26 @@ pub(crate) struct RateCurve {
 clone_in_place!(RateCurve { max, constant, leads, interval });
 
 impl RateCurve {
-    /// Returns a curve of `n_knots` knots for a path of `n_groups` groups, to be computed by [`RateCurve::compute`].
-    pub(crate) fn new(n_knots: usize, n_groups: usize) -> Self {
+    /// Returns a curve of `n_knots` knots for a path of groups and rotations, to be computed by [`RateCurve::compute`].
+    pub(crate) fn new(n_knots: usize, n_groups: usize, n_rotations: usize) -> Self {
         let none = Row { slope: F64x4::ZERO, half: F64x4::ZERO };
-        let interval = IntervalLimits { rows: vec![none; MAX_ROWS * n_groups], ..IntervalLimits::default() };
+        let n_rows = MAX_ROWS * n_groups + MAX_TURN_ROWS * n_rotations;
+        let interval = IntervalLimits { rows: vec![none; n_rows], ..IntervalLimits::default() };
         Self { max: vec![0.0; n_knots], constant: vec![0.0; n_knots], leads: vec![false; n_knots], interval }
     }
 
     /// Computes the largest constant rates, with which [`RateCurve::compute`] is faster where they suffice.
-    pub(crate) fn compute_constant(&mut self, path: &SampledPath, limits: &[RateLimits]) {
+    pub(crate) fn compute_constant(&mut self, path: &SampledPath, limits: &PathLimits) {
         compute(Constant { curve: self, path, limits });
     }
 
     /// Computes the curve backwards from `end`, which the limits at the last knot reduce; `max` bounds every x.
-    pub(crate) fn compute(&mut self, path: &SampledPath, limits: &[RateLimits], end: f64, max: f64) {
+    pub(crate) fn compute(&mut self, path: &SampledPath, limits: &PathLimits, end: f64, max: f64) {
         compute(Backward { curve: self, path, limits, end, max });
     }
 
     /// Limits the curve to what can be reached from `start` ≤ max[0]: the time-optimal law.
-    pub(crate) fn reach(&mut self, path: &SampledPath, limits: &[RateLimits], start: f64) {
+    pub(crate) fn reach(&mut self, path: &SampledPath, limits: &PathLimits, start: f64) {
         compute(Forward { curve: self, path, limits, start });
     }
 }
@@ -255,19 +341,20 @@ pub(crate) fn largest<T: Register>(lanes: T) -> f64 {
 
 /// Returns the largest x with a = 0 at the last knot.
 #[inline(always)]
-fn last_constant<T: Register>(path: &SampledPath, limits: &[RateLimits]) -> f64 {
+fn last_constant<T: Register>(path: &SampledPath, limits: &PathLimits) -> f64 {
     let mut inverse = T::default();
     for ([_, here], limits) in path.ends(path.clock.len() - 2, limits) {
         inverse = inverse.fast_max(limits.of_constant(Derivatives::load(here)));
     }
-    largest::<T>(inverse).recip()
+    let turns = path.turns(path.clock.len() - 2, limits).map(|([_, here], limits)| of_constant_turn(limits, &here));
+    turns.fold(largest::<T>(inverse), f64::max).recip()
 }
 
 /// Kernel of [`RateCurve::compute_constant`].
 struct Constant<'a> {
     curve: &'a mut RateCurve,
     path: &'a SampledPath,
-    limits: &'a [RateLimits],
+    limits: &'a PathLimits,
 }
 
 impl Kernel for Constant<'_> {
@@ -284,7 +371,10 @@ impl Kernel for Constant<'_> {
                 inverse = inverse.fast_max(limits.of_constant(here));
                 inverse = inverse.fast_max(limits.of_constant(here.between(next, interval, 0.5)));
             }
-            *constant = largest(inverse).recip();
+            let turns = path.turns(i, limits).map(|([here, next], limits)| {
+                of_constant_turn(limits, &here).max(of_constant_turn(limits, &here.between(&next, interval, 0.5)))
+            });
+            *constant = turns.fold(largest(inverse), f64::max).recip();
         }
         curve.constant[last] = last_constant::<T>(path, limits);
     }
@@ -294,7 +384,7 @@ impl Kernel for Constant<'_> {
 struct Backward<'a> {
     curve: &'a mut RateCurve,
     path: &'a SampledPath,
-    limits: &'a [RateLimits],
+    limits: &'a PathLimits,
     end: f64,
     max: f64,
 }
@@ -328,7 +418,7 @@ impl Kernel for Backward<'_> {
 struct Forward<'a> {
     curve: &'a mut RateCurve,
     path: &'a SampledPath,
-    limits: &'a [RateLimits],
+    limits: &'a PathLimits,
     start: f64,
 }
 
@@ -401,9 +491,10 @@ mod tests {
     #[test]
     fn curve_does_not_depend_on_the_register_width() {
         let knots: Vec<f64> = (0..=200).map(|i| i as f64 / 200.0).collect();
-        let mut path = SampledPath::at(knots, 2);
-        for (u, samples) in path.knots_mut() {
-            for (group, sample) in samples.iter_mut().enumerate() {
+        let mut path = SampledPath::at(knots, 2, 0);
+        for index in 0..path.clock.len() {
+            let u = path.clock[index];
+            for (group, sample) in path.knot_mut(index).iter_mut().enumerate() {
                 let frequency = F64x4::new([0.0, 3.0, 7.0, 11.0]) * (1.0 + group as f64);
                 let phase = frequency * u;
                 *sample = [phase.sin(), frequency * phase.cos(), -frequency * frequency * phase.sin()];
@@ -411,11 +502,11 @@ mod tests {
         }
         let infinity = f64::INFINITY;
         let velocity = F64x4::new([1.0, 2.0, infinity, 3.0]);
-        let limits =
-            [4.0, 9.0].map(|size| RateLimits::new(velocity * size, F64x4::new([5.0, 6.0, 7.0, infinity]) * size));
-        let (path, limits) = (&path, &limits[..]);
+        let of_group = |size: f64| RateLimits::new(velocity * size, F64x4::new([5.0, 6.0, 7.0, infinity]) * size);
+        let limits = PathLimits { groups: [4.0, 9.0].map(of_group).to_vec(), rotations: Vec::new() };
+        let (path, limits) = (&path, &limits);
         let (end, max) = (infinity, 0.5);
-        let [mut any, mut four] = [(); 2].map(|()| RateCurve::new(201, 2));
+        let [mut any, mut four] = [(); 2].map(|()| RateCurve::new(201, 2, 0));
         any.compute_constant(path, limits);
         Constant { curve: &mut four, path, limits }.run::<F64x4>();
         assert_eq!(any.constant, four.constant);

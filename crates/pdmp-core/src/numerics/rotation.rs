@@ -258,6 +258,9 @@ pub(crate) struct Turning {
 }
 
 impl Turning {
+    /// The unit rotation at rest.
+    pub(crate) const REST: Self = Self { rotation: [1.0, 0.0, 0.0, 0.0], velocity: [0.0; 3], acceleration: [0.0; 3] };
+
     /// Returns the motion of q̄ ⊗ exp(δ) for δ, δ̇ and δ̈.
     #[inline(always)]
     pub(crate) fn times_exp(&self, [delta, slope, bend]: [Vector; 3]) -> Self {

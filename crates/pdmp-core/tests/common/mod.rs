@@ -85,7 +85,8 @@ pub(crate) fn grid(dt: f64, duration: f64) -> TimeGrid {
 /// Performs one tick under a command and checks that the motion written is that of the controller.
 pub(crate) fn tick(controller: &mut Controller, command: &Command) -> Result<Status> {
     let n = controller.primitive().n_dofs();
-    let (mut position, mut velocity, mut acceleration) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut position = vec![0.0; controller.primitive().n_coordinates()];
+    let (mut velocity, mut acceleration) = (vec![0.0; n], vec![0.0; n]);
     let mut motion = Motion { position: &mut position, velocity: &mut velocity, acceleration: &mut acceleration };
     let status = controller.update(command, &mut motion)?;
     assert_eq!(motion.position, controller.position());

@@ -12,7 +12,8 @@ use super::setters::Changes;
 use super::step::first_element;
 use crate::error::Result;
 use crate::kind::Kind;
-use crate::motion::time_law::RateLimits;
+use crate::motion::angular::AngularLimits;
+use crate::motion::time_law::{PathLimits, RateLimits};
 use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Margins of velocity and acceleration along the path.
@@ -26,7 +27,7 @@ const TOLERANCE: f64 = 1e-9;
 #[derive(Debug)]
 pub(super) struct Governor {
     /// Limits along the path.
-    pub(super) limits: Vec<RateLimits>,
+    pub(super) limits: PathLimits,
     pub(super) ahead: PathAhead,
     /// True if the limits determined the rate in the present tick.
     pub(super) slows: bool,
@@ -49,13 +50,13 @@ clone_in_place!(Governor { limits, ahead, slows, candidate, origin, trial, sampl
 impl Governor {
     /// Returns a governor of a controller, which has none.
     fn new(controller: &Controller) -> Self {
-        let n_groups = controller.groups.len();
+        let (n_groups, n_rotations) = (controller.groups.len(), controller.limiter.turns.len());
         let copy = || Box::new(controller.clone());
         Self {
-            limits: Vec::with_capacity(n_groups),
-            ahead: PathAhead::new(n_groups),
+            limits: PathLimits { groups: Vec::with_capacity(n_groups), rotations: Vec::with_capacity(n_rotations) },
+            ahead: PathAhead::new(n_groups, n_rotations),
             slows: false,
-            candidate: PathAhead::new(n_groups),
+            candidate: PathAhead::new(n_groups, n_rotations),
             origin: copy(),
             trial: copy(),
             sampler: copy(),
@@ -97,9 +98,19 @@ impl Controller {
         }
         let governor = self.governor.take().or_else(|| self.idle_governor.take());
         let mut governor = governor.unwrap_or_else(|| Box::new(Governor::new(self)));
-        governor.limits.clear();
-        governor.limits.extend(self.limiter.bounds.iter().map(|bounds| {
-            RateLimits::new(bounds.velocity * (1.0 - MARGINS[0]), bounds.acceleration * (1.0 - MARGINS[1]))
+        let PathLimits { groups, rotations } = &mut governor.limits;
+        let [velocity, acceleration] = MARGINS.map(|margin| 1.0 - margin);
+        groups.clear();
+        groups.extend(
+            self.limiter
+                .bounds
+                .iter()
+                .map(|bounds| RateLimits::new(bounds.velocity * velocity, bounds.acceleration * acceleration)),
+        );
+        rotations.clear();
+        rotations.extend(self.limiter.turns.iter().map(|turn| AngularLimits {
+            velocity: turn.limits.velocity * velocity,
+            acceleration: turn.limits.acceleration * acceleration,
         }));
         self.governor = Some(governor);
     }

@@ -1,6 +1,10 @@
 //! Limits of all groups of DoFs in the control loop.
 
+use super::pose::place;
+use super::turning::{LimitedTurn, walk_turning};
 use crate::error::Result;
+use crate::model::Primitive;
+use crate::motion::angular::AngularLimits;
 use crate::motion::limits::{Limit, Limits, limit_of_dof};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
 use crate::motion::viability::Bounds;
@@ -30,6 +34,8 @@ pub(super) struct Limiter {
     has_jerk: bool,
     /// Position, velocity and acceleration at the start of the tick.
     pub(super) before: Vec<[F64x4; 3]>,
+    /// Limits of the rotations, and their motion at the start of the tick; the DoFs of a rotation have none of their own.
+    pub(super) turns: Vec<LimitedTurn>,
     /// Time for which `before` was kept without limits, negative if it was not.
     kept_at: f64,
     /// Limit that determined the acceleration of each DoF in the last tick.
@@ -53,6 +59,7 @@ clone_in_place!(Limiter {
     jerk,
     has_jerk,
     before,
+    turns,
     kept_at,
     limited,
     excess,
@@ -62,9 +69,9 @@ clone_in_place!(Limiter {
 });
 
 impl Limiter {
-    /// Returns no limits for DoFs with the given ranges.
-    pub(super) fn none(ranges: &[f64]) -> Self {
-        let n_dofs = ranges.len();
+    /// Returns no limits for a primitive.
+    pub(super) fn none(primitive: &Primitive) -> Self {
+        let (ranges, n_dofs) = (primitive.ranges(), primitive.n_dofs());
         let min_range = MIN_RANGE_RATIO * largest_range(ranges);
         let infinite = F64x4::splat(f64::INFINITY);
         let none =
@@ -78,6 +85,7 @@ impl Limiter {
             jerk: vec![f64::INFINITY; n_dofs],
             has_jerk: false,
             before: vec![[F64x4::ZERO; 3]; groups(n_dofs)],
+            turns: primitive.rotation_dofs().map(LimitedTurn::none).collect(),
             kept_at: -1.0,
             limited: vec![None; n_dofs],
             excess: vec![F64x4::ZERO; groups(n_dofs)],
@@ -97,8 +105,16 @@ impl Limiter {
         let infinity = f64::INFINITY;
         let distance =
             |dof: usize| limit_of_dof(&limits.upper, dof, infinity) - limit_of_dof(&limits.lower, dof, -infinity);
-        let velocity = |dof: usize| limit_of_dof(&limits.velocity, dof, infinity);
-        let acceleration = |dof: usize| limit_of_dof(&limits.acceleration, dof, infinity);
+        for turn in &mut self.turns {
+            turn.limits = limits.of_rotation(turn.dof);
+        }
+        let turns = &self.turns;
+        let plain = |limits: &Option<Vec<f64>>, dof: usize| {
+            let is_turn = turns.iter().any(|turn| turn.dofs().contains(&dof));
+            if is_turn { infinity } else { limit_of_dof(limits, dof, infinity) }
+        };
+        let velocity = |dof: usize| plain(&limits.velocity, dof);
+        let acceleration = |dof: usize| plain(&limits.acceleration, dof);
         let braking = |dof: usize| {
             let possible = if acceleration(dof) < infinity {
                 acceleration(dof)
@@ -147,7 +163,13 @@ impl Limiter {
     /// Returns whether limits of velocity or acceleration bound the rate of the clock.
     pub(super) fn limits_rate(&self) -> bool {
         let finite = |limit: F64x4| limit.to_array().iter().any(|limit| limit.is_finite());
-        self.synchronous && self.bounds.iter().any(|bounds| finite(bounds.velocity) || finite(bounds.acceleration))
+        let by_bounds = self.bounds.iter().any(|bounds| finite(bounds.velocity) || finite(bounds.acceleration));
+        self.synchronous && (by_bounds || self.limits_turns())
+    }
+
+    /// Returns whether a rotation has limits.
+    pub(super) fn limits_turns(&self) -> bool {
+        self.turns.iter().any(|turn| turn.limits.are_finite())
     }
 
     /// Returns whether a jerk is limited.
@@ -195,11 +217,22 @@ impl Limiter {
     }
 
     /// Keeps the motion at the end of the tick that ended at a time, before the first command after it changes the motion at once.
-    /// Limits that are set before the next tick count from there.
-    pub(super) fn keep(&mut self, time: f64, position: &[F64x4], velocity: &[F64x4], acceleration: &[F64x4]) {
-        if self.kept_at != time {
+    /// Limits that are set before the next tick count from there. Returns whether it was not kept yet.
+    pub(super) fn keep(&mut self, time: f64, position: &[F64x4], velocity: &[F64x4], acceleration: &[F64x4]) -> bool {
+        let is_first = self.kept_at != time;
+        if is_first {
             self.begin(position, velocity, acceleration);
             self.kept_at = time;
+        }
+        is_first
+    }
+
+    /// Sets the residual rotations at the start of a tick, after a command has expressed the same rotations by others.
+    pub(super) fn place_turns(&mut self, position: &[F64x4]) {
+        for turn in &self.turns {
+            for (group, lane) in turn.dofs().map(place) {
+                self.before[group][0].as_mut_array()[lane] = position[group].as_array()[lane];
+            }
         }
     }
 
@@ -225,14 +258,21 @@ impl Limiter {
             let lanes = self.bounds.iter().flat_map(|bounds| limit(bounds).to_array());
             Some(lanes.take(n_dofs).collect())
         };
-        Limits {
+        let mut limits = Limits {
             lower: vector(|bounds| bounds.lower),
             upper: vector(|bounds| bounds.upper),
             velocity: vector(|bounds| bounds.velocity),
             acceleration: vector(|bounds| bounds.acceleration),
             jerk: Some(self.jerk.clone()),
             synchronous: self.synchronous,
+        };
+        for turn in &self.turns {
+            let AngularLimits { velocity, acceleration } = turn.limits;
+            for (limits, limit) in [(&mut limits.velocity, velocity), (&mut limits.acceleration, acceleration)] {
+                limits.iter_mut().for_each(|limits| limits[turn.dofs()].fill(limit));
+            }
         }
+        limits
     }
 
     /// Visits the state, with the bounds of a quantity in units of a DoF, for movements of a `duration` and ticks of `dt`
@@ -251,6 +291,7 @@ impl Limiter {
         for lanes in self.before.iter_mut().flatten() {
             visit(lanes.as_mut_array(), quantity)?;
         }
+        self.turns.iter_mut().try_for_each(|turn| walk_turning(visit, &mut turn.before, quantity))?;
         let kinds = [None, Some(Limit::Position), Some(Limit::Velocity), Some(Limit::Acceleration), Some(Limit::Jerk)];
         for limited in &mut self.limited {
             let mut index = kinds.iter().position(|kind| kind == limited).map_or(0.0, |index| index as f64);

@@ -27,7 +27,7 @@ const ROUNDING: f64 = 1e-13;
 const ROUNDING_OF_RATE: f64 = 1e-9;
 
 /// Share of a limit from which a DoF slows the clock; the margins of the path ahead are smaller.
-const NEAR_LIMIT: f64 = 0.95;
+pub(super) const NEAR_LIMIT: f64 = 0.95;
 
 impl Controller {
     /// Sets the limits of position, velocity, acceleration and jerk; those of [`Limits::default`] are none.
@@ -49,6 +49,10 @@ impl Controller {
     /// DoF is held at its limit and continues from there when the path returns; `nearest_feasible` finds conditions that stay
     /// inside. A command during the movement is accepted in part instead ([`Controller::is_pending`]). Where the acceleration
     /// along the path steps, a limit of the jerk binds single DoFs. [`Controller::limited`] names the limits that bind.
+    ///
+    /// Limits of a rotation bound the sizes of its angular velocity and acceleration: |ω| ≤ Ω and |ω̇| ≤ A at the end of every tick,
+    /// |Δω|/Δt ≤ A in the frame of the tool and in that of the world, and an angle of at most Ω·Δt between the ends. A limited tick ends
+    /// with the ω within both that is closest to the wanted one, and turns about a fixed axis.
     ///
     /// The limits remain in force after [`Controller::reset`]. The first time, this function allocates memory for the path ahead,
     /// unless every DoF is limited on its own; later calls do not.
@@ -82,7 +86,7 @@ impl Controller {
         }
         // Within limits, the next tick continues the last one.
         if !was_active {
-            self.limiter.keep(self.time.value(), &self.position, &self.velocity, &self.acceleration);
+            self.keep_motion();
         }
         self.limiter.reduce_accelerations();
         if self.changes_centre() {
@@ -119,11 +123,19 @@ impl Controller {
     pub(super) fn publish(&mut self) {
         self.publish_dofs();
         self.publish_pose();
+        self.keep_turns();
+    }
+
+    /// Keeps the motion at the end of the last tick, from which limits count that are set later.
+    fn keep_motion(&mut self) {
+        if self.limiter.keep(self.time.value(), &self.position, &self.velocity, &self.acceleration) {
+            self.begin_turns();
+        }
     }
 
     fn publish_dofs(&mut self) {
         if !self.limiter.is_active() {
-            self.limiter.keep(self.time.value(), &self.position, &self.velocity, &self.acceleration);
+            self.keep_motion();
         }
         self.read_out();
         if !self.started {
@@ -145,7 +157,7 @@ impl Controller {
     /// Applies the limits to the tick of `dt` seconds and `h` on the clock that has just been computed, from ρ = `rate`.
     #[inline(always)]
     pub(super) fn enforce_limits(&mut self, dt: f64, h: f64, rate: f64) {
-        let kept_by_all = compute(Admission { controller: self, dt })
+        let kept_by_all = compute(Admission { controller: self, dt }) & self.admits_turns(dt)
             && !(self.limiter.has_jerk() && (0..self.groups.len()).any(|index| self.breaks_jerk(index, dt).any()));
         if !(kept_by_all && self.limiter.is_free && self.perturbation.limited_rate() == 1.0) {
             self.limit(dt, h, rate);
@@ -158,6 +170,7 @@ impl Controller {
             self.name_limits(dt, slows);
         }
         self.limiter.begin(&self.position, &self.velocity, &self.acceleration);
+        self.begin_turns();
     }
 
     /// Reduces the accelerations at the end of a tick of `dt` seconds, of which little belongs to this tick, to their limits.
@@ -203,6 +216,9 @@ impl Controller {
                 *limited = Some(Limit::Acceleration);
             }
         }
+        if slows {
+            self.name_turns(dt);
+        }
     }
 
     /// Limits the DoFs that do not keep their limits over a tick of `dt` seconds and `h` on the clock.
@@ -238,7 +254,11 @@ impl Controller {
             let limited_rate = self.velocity[index] * scale;
             squares[1] += limited_rate * limited_rate;
         }
-        self.hold_rate(rate, squares.map(F64x4::reduce_add));
+        let by_turns = self.limit_turns(dt);
+        let squares = [0, 1].map(|i| (squares[i].reduce_add() + by_turns[i]).max(0.0));
+        self.hold_rate(rate, squares);
+        self.follow_turns();
+        self.publish_limited();
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
         self.perturbation.set_excess(self.limiter.excess.iter().copied(), h * (alpha_z * beta_z).sqrt());
     }
@@ -256,6 +276,7 @@ impl Controller {
         for (group, velocity) in self.groups.iter_mut().zip(&self.velocity) {
             group.z += *velocity * (held.recip() - rate.recip());
         }
+        self.hold_turns(held - rate, held);
         self.rate.start(held, &self.rate_gains);
     }
 

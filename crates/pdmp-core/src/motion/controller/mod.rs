@@ -29,6 +29,7 @@ mod snapshot;
 mod start;
 mod step;
 mod synchronous;
+mod turning;
 
 use std::sync::Arc;
 
@@ -268,7 +269,7 @@ impl Controller {
             acceleration: zeros,
             flush_level: FLUSH_RATIO * largest_range(primitive.ranges()),
             perturbation: Perturbation::new(primitive),
-            limiter: Limiter::none(primitive.ranges()),
+            limiter: Limiter::none(primitive),
             governor: None,
             idle_governor: None,
             rate_slope: None,

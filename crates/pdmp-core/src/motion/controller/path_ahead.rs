@@ -12,10 +12,11 @@ use super::step::first_element;
 use crate::dynamics::canonical::Canonical;
 use crate::error::Result;
 use crate::kind::Kind;
-use crate::motion::sampled_path::{Derivatives, SampledPath};
-use crate::motion::time_law::{RateCurve, RateLimits, largest};
+use crate::motion::sampled_path::{Derivatives, SampledPath, TurnDerivatives};
+use crate::motion::time_law::{PathLimits, RateCurve, in_plane, largest, of_angular_velocity};
 use crate::motion::viability::Bounds;
-use crate::numerics::simd::{Kernel, Register, compute};
+use crate::numerics::rotation::Turning;
+use crate::numerics::simd::{Kernel, Register, compute, unpack};
 use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Number of intervals of the path. Learnt from recordings, y″ between the knots is within 1 % of its maximum.
@@ -79,11 +80,11 @@ impl PathPosition {
 }
 
 impl PathAhead {
-    /// Returns memory for a path of groups of DoFs.
-    pub(super) fn new(n_groups: usize) -> Self {
+    /// Returns memory for a path of groups of DoFs and rotations.
+    pub(super) fn new(n_groups: usize, n_rotations: usize) -> Self {
         Self {
-            path: SampledPath::at(vec![0.0; N_INTERVALS + 1], n_groups),
-            curve: RateCurve::new(N_INTERVALS + 1, n_groups),
+            path: SampledPath::at(vec![0.0; N_INTERVALS + 1], n_groups, n_rotations),
+            curve: RateCurve::new(N_INTERVALS + 1, n_groups, n_rotations),
             max_rate: 0.0,
             pieces: [Piece::default(); 2],
             position: PathPosition::default(),
@@ -91,7 +92,7 @@ impl PathAhead {
     }
 
     /// Samples the path of a controller by a copy of it.
-    pub(super) fn compute(&mut self, controller: &Controller, sampler: &mut Controller, limits: &[RateLimits]) {
+    pub(super) fn compute(&mut self, controller: &Controller, sampler: &mut Controller, limits: &PathLimits) {
         sampler.clone_from(controller);
         self.pieces = controller.pieces();
         for Piece { first, start, interval } in self.pieces {
@@ -101,6 +102,7 @@ impl PathAhead {
         }
         let longest = self.pieces[0].interval.max(self.pieces[1].interval);
         sampler.max_clock_step = longest * (1.0 + 1e-9);
+        self.path.sample_turns(limits);
         sampler.sample_path(&mut self.path);
         self.curve.compute_constant(&self.path, limits);
         let rhythmic = controller.primitive.kind() == Kind::Rhythmic;
@@ -160,18 +162,18 @@ impl PathAhead {
 
     /// Returns the smallest and the largest constant ρ̇ to the end of the interval, for ρ² = `x` now, that keep the limits in the
     /// quarters of the interval and arrive below the curve.
-    pub(super) fn slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
+    pub(super) fn slopes(&self, x: f64, limits: &PathLimits) -> [f64; 2] {
         let (index, t) = self.locate(self.position.progress);
         self.slopes_within(index, t, x, limits)
     }
 
     /// Returns the slopes as [`PathAhead::slopes`] at the next knot, for ρ² = `x` there.
-    pub(super) fn next_slopes(&self, x: f64, limits: &[RateLimits]) -> [f64; 2] {
+    pub(super) fn next_slopes(&self, x: f64, limits: &PathLimits) -> [f64; 2] {
         let (index, _) = self.locate(self.position.progress);
         self.slopes_within((index + 1).min(N_INTERVALS - 1), 0.0, x, limits)
     }
 
-    fn slopes_within(&self, index: usize, t: f64, x: f64, limits: &[RateLimits]) -> [f64; 2] {
+    fn slopes_within(&self, index: usize, t: f64, x: f64, limits: &PathLimits) -> [f64; 2] {
         let [least, most] = compute(Slopes { path: &self.path, limits, index, t, x });
         let (change, gap) = (self.change(index), self.curve.max[index] + self.change(index) * t - x);
         // Below the curve, the filter of the rate does not exceed the rate that the curve was computed for.
@@ -214,7 +216,7 @@ impl PathAhead {
 /// Kernel of [`PathAhead::slopes`]: the smallest and the largest ρ̇ from position `t` in interval `index`, for ρ² = `x` there.
 struct Slopes<'a> {
     path: &'a SampledPath,
-    limits: &'a [RateLimits],
+    limits: &'a PathLimits,
     index: usize,
     t: f64,
     x: f64,
@@ -249,14 +251,39 @@ impl Kernel for Slopes<'_> {
                 ends = [(centre + half).fast_min(ends[0]), (half - centre).fast_min(ends[1])];
                 inverse = inverse.fast_max(limits.of_velocity(slope));
             }
+            let mut by_turns = 0.0f64;
+            for ([here, next], limits) in path.turns(index, limits) {
+                let turn = here.between(&next, interval, position);
+                let of_turn = turn_slopes(&turn, limits.acceleration, 2.0 * since, x);
+                for (end, of_turn) in ends.iter_mut().zip(of_turn) {
+                    // No number, where the rotation rests, leaves the end.
+                    *end = T::splat(of_turn).fast_min(*end);
+                }
+                by_turns = by_turns.max(of_angular_velocity(limits, turn.slope));
+            }
             // At the present clock the velocity does not depend on ρ̇.
             if since > 0.0 {
-                let rest = (largest(inverse).recip() - x) * 0.5;
+                let rest = (largest(inverse).max(by_turns).recip() - x) * 0.5;
                 by_velocity = by_velocity.min((rest / since).max(rest / interval));
             }
         }
         [-ends[0].smallest(), ends[1].smallest().min(by_velocity)]
     }
+}
+
+/// Returns minus the smallest and the largest ρ̇ that a limit of the angular acceleration admits for ρ² = `x`. No number is none.
+fn turn_slopes(turn: &TurnDerivatives, limit: f64, twice: f64, x: f64) -> [f64; 2] {
+    let [beta, along, across] = in_plane(turn, twice);
+    let (along, across) = (along * x, across * x);
+    // As for a DoF.
+    let [tight, wide] = TICK_MARGINS.map(|margin| limit * ((1.0 - margin) / (1.0 - MARGINS[1])));
+    if across > wide {
+        // No ρ̇ reduces the part across β before the rate has fallen.
+        return [f64::INFINITY, 0.0];
+    }
+    let acceleration = (along * along + across * across).sqrt().max(tight).min(wide);
+    let half = ((acceleration - across) * (acceleration + across)).max(0.0).sqrt();
+    [half + along, half - along].map(|end| end / beta)
 }
 
 /// Kernel of [`PathAhead::distance_outside`], from knot `first` on.
@@ -338,7 +365,8 @@ impl Controller {
         self.rate.reset(&[1.0]);
         self.read_out();
         let (mut u, mut h) = (path.clock[0], 0.0);
-        for (knot, samples) in path.knots_mut() {
+        for index in 0..path.clock.len() {
+            let knot = path.clock[index];
             // An interval that is equal up to rounding has the same propagator.
             if (knot - u - h).abs() > SAME_INTERVAL * h {
                 h = knot - u;
@@ -346,13 +374,29 @@ impl Controller {
             if knot > u {
                 self.follow_path(h);
             }
+            let samples = path.knot_mut(index);
             let n = samples.len();
             let (position, velocity, acceleration) =
                 (&self.position[..n], &self.velocity[..n], &self.acceleration[..n]);
             for (group, sample) in samples.iter_mut().enumerate() {
                 *sample = [position[group], velocity[group], acceleration[group]];
             }
+            self.sample_turns(path.turns_mut(index));
             u = knot;
+        }
+    }
+
+    /// Samples the rotations of a path at the present clock, at the rate 1.
+    fn sample_turns(&self, samples: &mut [TurnDerivatives]) {
+        if samples.is_empty() {
+            return;
+        }
+        let Some(coordinates) = self.primitive.coordinates() else { return };
+        let (n_dofs, rates) = (self.primitive.n_dofs(), [self.perturbation.phase_rate(), 0.0]);
+        let dofs = [&*self.position, &self.velocity, &self.acceleration].map(|lanes| unpack(lanes, n_dofs));
+        for (rotation, sample) in coordinates.rotations().iter().zip(samples) {
+            let Turning { velocity, acceleration, .. } = rotation.motion(self.clock.value(), rates, dofs);
+            *sample = TurnDerivatives { slope: velocity, bend: acceleration };
         }
     }
 

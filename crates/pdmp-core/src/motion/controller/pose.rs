@@ -9,7 +9,7 @@ use super::step::first_element;
 use crate::model::Conditions;
 use crate::model::coordinates::Coordinates;
 use crate::motion::command::{Command, Coupling};
-use crate::numerics::rotation::{dot, exp, inverse_jacobian, jacobian, log_near};
+use crate::numerics::rotation::{Turning, Vector, dot, exp, inverse_jacobian, jacobian, log_near};
 use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, compute, unpack};
 use crate::numerics::state::clone_in_place;
 
@@ -23,6 +23,8 @@ pub(super) struct Pose {
     pub(super) position: Vec<f64>,
     pub(super) velocity: Vec<f64>,
     pub(super) acceleration: Vec<f64>,
+    /// Motion of the rotations, in the body frame.
+    pub(super) turns: Vec<Turning>,
     /// Goal or anchor in force.
     pub(super) centre: Vec<f64>,
     /// Commanded final velocity.
@@ -35,7 +37,7 @@ pub(super) struct Pose {
     coupling: [Vec<f64>; 2],
 }
 
-clone_in_place!(Pose { position, velocity, acceleration, centre, goal_velocity, command, measured, coupling });
+clone_in_place!(Pose { position, velocity, acceleration, turns, centre, goal_velocity, command, measured, coupling });
 
 impl Pose {
     /// Returns the memory for a primitive; `None` where its coordinates are its degrees of freedom.
@@ -45,7 +47,17 @@ impl Pose {
         let [velocity, acceleration, goal_velocity, command, measured, c_v, c_a] = [(); 7].map(|()| vec![0.0; n_dofs]);
         let [position, centre] = [(); 2].map(|()| vec![0.0; n]);
         let coupling = [c_v, c_a];
-        Some(Box::new(Self { position, velocity, acceleration, centre, goal_velocity, command, measured, coupling }))
+        Some(Box::new(Self {
+            position,
+            velocity,
+            acceleration,
+            turns: vec![Turning::REST; coordinates.rotations().len()],
+            centre,
+            goal_velocity,
+            command,
+            measured,
+            coupling,
+        }))
     }
 
     /// Computes the DoFs of a commanded goal or anchor, close to those of the goal before it. Returns whether the rotations of
@@ -73,13 +85,22 @@ impl Kernel for Publish<'_> {
 
     #[inline(always)]
     fn run<T: Register>(self) {
-        let Controller { pose, primitive, position, velocity, acceleration, rate, perturbation, clock, .. } = self.0;
+        let Controller {
+            pose, primitive, position, velocity, acceleration, rate, perturbation, clock, limiter, ..
+        } = self.0;
         let (Some(pose), Some(coordinates)) = (pose, primitive.coordinates()) else { return };
         let phase_rate = perturbation.phase_rate();
         let rates = [rate.value(), rate.rate()].map(|rate| phase_rate * first_element(rate));
         let dofs = [&*position, velocity, acceleration].map(|lanes| unpack(lanes, primitive.n_dofs()));
-        let Pose { position, velocity, acceleration, .. } = &mut **pose;
-        coordinates.motion(clock.value(), rates, dofs, position, velocity, acceleration);
+        let Pose { position, velocity, acceleration, turns, .. } = &mut **pose;
+        coordinates.write_plain(dofs, position, velocity, acceleration);
+        for ((rotation, turn), limited) in coordinates.rotations().iter().zip(turns).zip(&limiter.turns) {
+            *turn = rotation.motion(clock.value(), rates, dofs);
+            if limited.limits.are_finite() {
+                turn.acceleration = limited.limits.reduced(turn.acceleration);
+            }
+            coordinates.write(rotation, *turn, position, velocity, acceleration);
+        }
     }
 }
 
@@ -173,7 +194,8 @@ impl Controller {
         let rate = first_element(rate.value());
         if rate <= 0.0 {
             // In a pause nothing moves, but the state changes its place.
-            return move_still(coordinates, [clock.value(), to], position);
+            move_still(coordinates, [clock.value(), to], position);
+            return self.limiter.place_turns(&self.position);
         }
         let phase_rate = perturbation.phase_rate();
         for rotation in coordinates.rotations() {
@@ -186,6 +208,7 @@ impl Controller {
                 groups[group].z.as_mut_array()[lane] += after[1][i] - before[1][i];
             }
         }
+        self.limiter.place_turns(&self.position);
     }
 
     /// Takes up a commanded goal or anchor in coordinates; returns whether it has changed.
@@ -226,6 +249,7 @@ impl Controller {
                 centre.set_value(group, frame);
             }
         }
+        self.limiter.place_turns(&self.position);
     }
 
     /// Gives the three DoFs of each rotation the length of its distance from the goal, which depends on no frame.
@@ -286,14 +310,22 @@ fn move_still(coordinates: &Coordinates, clocks: [f64; 2], position: &mut [F64x4
 }
 
 /// Returns the group of a DoF and its lane.
-fn place(dof: usize) -> (usize, usize) {
+pub(super) fn place(dof: usize) -> (usize, usize) {
     (dof / WIDTH, dof % WIDTH)
 }
 
 /// Returns the three DoFs from one on.
-fn vector_at(lanes: &[F64x4], dof: usize) -> [f64; 3] {
+pub(super) fn vector_at(lanes: &[F64x4], dof: usize) -> Vector {
     std::array::from_fn(|i| {
         let (group, lane) = place(dof + i);
         lanes[group].as_array()[lane]
     })
+}
+
+/// Sets the three DoFs from one on.
+pub(super) fn set_vector(lanes: &mut [F64x4], dof: usize, vector: Vector) {
+    for (i, x) in vector.into_iter().enumerate() {
+        let (group, lane) = place(dof + i);
+        lanes[group].as_mut_array()[lane] = x;
+    }
 }

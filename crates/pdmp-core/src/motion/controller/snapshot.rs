@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::group::Gate;
+use super::turning::walk_turning;
 use super::{Controller, Status};
 use crate::dynamics::command_filter::FilterStep;
 use crate::error::{Error, Result};
@@ -14,12 +15,13 @@ use crate::kind::Kind;
 use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, ResolvedConditions, check_tau, reject_goal_velocity};
 use crate::model::primitive::Primitive;
 use crate::motion::perturbation::MAX_PHASE_RATE;
+use crate::numerics::rotation::{Quaternion, dot};
 use crate::numerics::simd::F64x4;
 use crate::numerics::state::{Visitor, visit_flag, visit_number};
 use crate::validate::MAX_MAGNITUDE;
 
 /// Version of the snapshot; a change of `walk` increments it.
-const VERSION: f64 = 1.0;
+const VERSION: f64 = 2.0;
 /// Length of the header: version, numbers of the primitive, tick length and transition.
 const HEADER: usize = 10;
 /// Bounds of a quantity in units of a DoF. Its products with every gain and rate stay finite.
@@ -28,6 +30,8 @@ const QUANTITY: [f64; 2] = [-1e200, 1e200];
 const TIME: [f64; 2] = [0.0, 1e300];
 /// Maximum clock of a discrete movement, relative to its extent; a transition from there still has a length.
 const MAX_CLOCK: f64 = 1e9;
+/// Maximum error of the square of a quaternion's norm, far above rounding.
+const MAX_NORM_ERROR: f64 = 1e-9;
 /// Maximum rate, relative to the nominal one: the product of the largest speed and the largest 1/τ, with a margin for rounding.
 const MAX_RATE: f64 = 1.001e12;
 
@@ -68,7 +72,7 @@ impl Controller {
             |expected| Error::Length { name: "snapshot", expected, found: snapshot.len(), per: "number of the state" };
         let Some((head, mut rest)) = snapshot.split_at_checked(HEADER) else { return Err(length(HEADER)) };
         if head[0] != VERSION {
-            return Err(Error::Range { name: "snapshot version", value: head[0], allowed: "must be 1" });
+            return Err(Error::Range { name: "snapshot version", value: head[0], allowed: "must be 2" });
         }
         if head[..HEADER - 2] != header(primitive) {
             return Err(unsuitable("belongs to another model: restore it with the model of its controller"));
@@ -95,7 +99,6 @@ impl Controller {
             return Err(length(expected));
         }
         controller.check_restored()?;
-        controller.publish_pose();
         controller.publish_centre(None);
         Ok(controller)
     }
@@ -217,8 +220,11 @@ impl Controller {
         limiter.walk(visit, QUANTITY, primitive.duration(), *dt)?;
         *command_step = FilterStep::IDENTITY;
         if let Some(pose) = pose {
-            // The sign of a quaternion depends on the past.
-            visit(&mut pose.position, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
+            // The sign of a quaternion depends on the past, and so does a motion that limits have changed.
+            visit(&mut pose.position, QUANTITY)?;
+            visit(&mut pose.velocity, QUANTITY)?;
+            visit(&mut pose.acceleration, QUANTITY)?;
+            pose.turns.iter_mut().try_for_each(|turn| walk_turning(visit, turn, QUANTITY))?;
             visit(&mut pose.goal_velocity, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
         }
         Ok(())
@@ -228,6 +234,14 @@ impl Controller {
     fn check_restored(&self) -> Result<()> {
         check_tau(self.conditions.tau, self.primitive.tau())?;
         check_tau(self.max_tau, self.primitive.tau())?;
+        let unit = |q: &Quaternion| (dot(*q, *q) - 1.0).abs() < MAX_NORM_ERROR;
+        if let (Some(pose), Some(coordinates)) = (&self.pose, self.primitive.coordinates()) {
+            coordinates.check("snapshot", &pose.position)?;
+            let turns = pose.turns.iter().chain(self.limiter.turns.iter().map(|turn| &turn.before));
+            if !turns.map(|turn| &turn.rotation).all(unit) {
+                return Err(unsuitable("describes no state: the quaternion of a rotation has another norm than 1"));
+            }
+        }
         reject_goal_velocity(&self.primitive, self.conditions.has_goal_velocity)?;
         if self.goal_transition.is_active() && !self.has_frame() {
             return Err(unsuitable("describes no state: a transition of the goal needs learnt transport"));

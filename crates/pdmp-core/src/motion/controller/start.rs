@@ -75,6 +75,7 @@ impl Controller {
         self.start_rate();
         self.begin_first_tick();
         self.publish_pose();
+        self.begin_turns();
     }
 
     /// Sets the motion from which the first tick begins to the present one.

@@ -64,7 +64,8 @@ impl Controller {
             let past = self.primitive.forcing_table().is_past(self.clock.value());
             self.status = if past { self.settled() } else { Status::Working };
         }
-        if self.pose.is_some() {
+        // Limits have converted the motion already.
+        if !self.limiter.is_active() {
             self.publish_pose();
         }
         self.status

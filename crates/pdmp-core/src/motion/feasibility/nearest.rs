@@ -16,12 +16,14 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 
-use super::Margins;
 use super::bounds::{Bound, Excess, TOLERANCE, bounds};
 use super::extremes::{Movement, Place};
 use super::quadratic_program::HalfSpaces;
 use super::sampling::sampled;
+use super::turn_cuts::{Cut, TurnCuts};
+use super::turning::compare;
 use super::variables::{Variables, Vary};
+use super::{Extreme, Margins, feasible};
 use crate::error::{Error, LimitError, Result};
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
@@ -40,7 +42,8 @@ const EXCESS_TOLERANCE: f64 = 1e-3;
 ///
 /// The distance of a change Δs of the style and Δg of the goal, or anchor, is Δsᵀ Σ_s⁻¹ Δs + Δgᵀ Σ_g⁻¹ Δg with the covariances of
 /// the demonstrations, to which squares of a tenth of the range of styles and positions are added. Start, τ and the other
-/// conditions remain. Conditions that keep the limits are returned unchanged. A limit of the jerk does not count.
+/// conditions remain. The sizes of angular velocities and accelerations are linearised: within limits of rotations the conditions are
+/// the nearest ones up to their curvature. Conditions that keep the limits are returned unchanged. A limit of the jerk does not count.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
@@ -102,21 +105,43 @@ fn nearest(
 ) -> Result<Conditions> {
     if let Some(coordinates) = model.primitive().coordinates() {
         limits.check_rotations(model.primitive())?;
+        if feasible(model.primitive(), limits, request)?.is_feasible() {
+            return Ok(request.clone());
+        }
         let inside = Model { primitive: Arc::clone(coordinates.dofs()), ..model.clone() };
-        let found = nearest(&inside, limits, &coordinates.constant_in_dofs(request)?, vary, predicted)?;
+        let turns = TurnCuts { primitive: model.primitive(), limits, request };
+        let turns = limits.bound_rotations(model.primitive()).then_some(turns);
+        let plain = limits.of_plain_dofs(model.primitive());
+        let of_dofs = coordinates.constant_in_dofs(request)?;
+        let found = search(&inside, &plain, &of_dofs, vary, predicted, turns)?;
         let (velocity, goal_velocity) = (request.velocity.clone(), request.goal_velocity.clone());
         return Ok(Conditions { velocity, goal_velocity, ..coordinates.of_dofs(found) });
     }
+    search(model, limits, request, vary, predicted, None)
+}
+
+/// Searches conditions of the DoFs within limits of DoFs and of rotations.
+fn search(
+    model: &Model,
+    limits: &Limits,
+    request: &Conditions,
+    vary: Vary,
+    predicted: Option<&Array2<f64>>,
+    turns: Option<TurnCuts>,
+) -> Result<Conditions> {
     let primitive = model.primitive();
     let bounds = bounds(primitive, limits)?;
     let movement = sampled(primitive, request)?;
-    let margins = Margins::of(&movement, &bounds);
-    if margins.is_feasible() {
-        return Ok(request.clone());
+    let mut margins = Margins::of(&movement, &bounds);
+    match &turns {
+        Some(turns) => compare(turns.primitive, turns.limits, turns.request, &mut margins)?,
+        None if margins.is_feasible() => return Ok(request.clone()),
+        None => {}
     }
     let variables = Variables::new(model, request, vary, predicted, &movement)?;
     let half_spaces = HalfSpaces::default();
-    let search = Search { primitive, bounds: &bounds, request, requested: &movement, variables, half_spaces };
+    let turns = turns.as_ref();
+    let search = Search { primitive, bounds: &bounds, turns, request, requested: &movement, variables, half_spaces };
     match search.run()? {
         Outcome::Feasible(conditions) => Ok(conditions),
         Outcome::Infeasible(obstacle) => Err(obstacle.error(vary, model.kind(), slower(&margins, request))),
@@ -146,6 +171,8 @@ struct Cuts {
 struct Search<'a> {
     primitive: &'a Arc<Primitive>,
     bounds: &'a [Bound],
+    /// Limits of rotations, if there are any.
+    turns: Option<&'a TurnCuts<'a>>,
     request: &'a Conditions,
     requested: &'a Movement,
     variables: Variables,
@@ -192,6 +219,22 @@ impl Search<'_> {
         cuts
     }
 
+    /// Adds the half-spaces of the stretches in which rotations exceed limits at x by more than `tolerance`. Returns the largest excess,
+    /// too.
+    ///
+    /// # Errors
+    /// A movement that overflows.
+    fn cut_turns(&mut self, x: &[f64], tolerance: f64) -> Result<(Cuts, f64)> {
+        let mut cuts = Cuts { n_added: 0, n_fixed: 0 };
+        let Some(turns) = self.turns else { return Ok((cuts, f64::NEG_INFINITY)) };
+        let (found, largest) = turns.at(x, tolerance, |x| self.variables.conditions(x))?;
+        for Cut { gradient, excess } in found {
+            let is_added = self.half_spaces.add(gradient, excess, x);
+            *(if is_added { &mut cuts.n_added } else { &mut cuts.n_fixed }) += 1;
+        }
+        Ok((cuts, largest))
+    }
+
     /// Searches the nearest feasible conditions; returns `None` if the half-spaces have no point in common, if an excess does
     /// not depend on x, or after too many rounds.
     ///
@@ -200,6 +243,9 @@ impl Search<'_> {
     fn nearest(&mut self) -> Result<Option<Conditions>> {
         let mut x = vec![0.0; self.variables.len()];
         let mut cuts = self.cut(self.requested, &x, TOLERANCE);
+        if cuts.n_added == 0 {
+            cuts = self.cut_turns(&x, TOLERANCE)?.0;
+        }
         for _ in 0..MAX_ROUNDS {
             if cuts.n_fixed > 0 {
                 break;
@@ -213,6 +259,9 @@ impl Search<'_> {
             // The sum of responses has rounding errors: the movement itself decides.
             let conditions = self.variables.conditions(&x);
             cuts = self.cut(&sampled(self.primitive, &conditions)?, &x, TOLERANCE);
+            if cuts.n_added + cuts.n_fixed == 0 {
+                cuts = self.cut_turns(&x, TOLERANCE)?.0;
+            }
             if cuts.n_added + cuts.n_fixed == 0 {
                 return Ok(Some(conditions));
             }
@@ -231,11 +280,13 @@ impl Search<'_> {
         for _ in 0..MAX_ROUNDS {
             let Some((x, expected)) = self.half_spaces.least_excess() else { break };
             let movement = self.variables.movement(self.requested, &x);
-            let excess = self.bounds.iter().map(|bound| bound.excess(&movement).excess).fold(f64::MIN, f64::max);
+            let tolerance = expected.max(0.0) + EXCESS_TOLERANCE;
+            let (cuts, of_turns) = self.cut_turns(&x, tolerance)?;
+            let excess = self.bounds.iter().map(|bound| bound.excess(&movement).excess).fold(of_turns, f64::max);
             if excess < least {
                 (best, least) = (x.clone(), excess);
             }
-            if self.cut(&movement, &x, expected.max(0.0) + EXCESS_TOLERANCE).n_added == 0 {
+            if self.cut(&movement, &x, tolerance).n_added + cuts.n_added == 0 {
                 break;
             }
         }
@@ -243,6 +294,11 @@ impl Search<'_> {
         let movement = sampled(self.primitive, &conditions)?;
         let excesses = self.bounds.iter().map(|bound| (bound, bound.excess(&movement)));
         let worst = excesses.max_by(|(_, a), (_, b)| a.excess.total_cmp(&b.excess));
+        let of_turns = self.turns.map(|turns| turns.worst(&conditions)).transpose()?.flatten();
+        let exceeds = |ratio: f64| ratio - 1.0 > TOLERANCE.max(worst.map_or(f64::MIN, |(_, worst)| worst.excess));
+        if let Some((bound, Extreme { ratio, time, .. })) = of_turns.filter(|(_, extreme)| exceeds(extreme.ratio)) {
+            return Ok(Outcome::Infeasible(Obstacle { bound, value: ratio * bound.value, time }));
+        }
         Ok(match worst.filter(|(_, worst)| worst.excess > TOLERANCE) {
             None => Outcome::Feasible(conditions),
             Some((bound, worst)) => Outcome::Infeasible(Obstacle::at(bound, &movement, worst.place)),

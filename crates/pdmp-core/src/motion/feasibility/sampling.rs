@@ -33,7 +33,7 @@ pub(super) fn sampled(primitive: &Arc<Primitive>, conditions: &Conditions) -> Re
 }
 
 /// Returns the times of the samples, in seconds.
-fn times(primitive: &Primitive, conditions: &Conditions) -> Result<Vec<f64>> {
+pub(super) fn times(primitive: &Primitive, conditions: &Conditions) -> Result<Vec<f64>> {
     let duration = primitive.duration() * conditions.time_constant(primitive)? / primitive.tau();
     let segments = conditions.segment_durations.as_ref().filter(|segments| segments.len() > 1);
     let warp = segments.map(|segments| primitive.warping_function(segments)).transpose()?;
