@@ -13,6 +13,7 @@
 //! | `outliers` | cycles that differ from the others |
 //! | `cycle_growth` | gain per cycle, such as that of the angle of a wheel |
 //! | `cycles` | one closed demonstration per cycle, in phase across recordings |
+//! | `orientation` | conversions to and from unit quaternions |
 //! | `inspection` | detection of implausible samples |
 //!
 //! Results keep the names, units and context of a recording, and its goal if the movement ends where the recording does.
@@ -24,6 +25,7 @@ mod cycles;
 mod gaps;
 pub mod inspection;
 mod lowpass;
+pub mod orientation;
 mod outliers;
 mod periodicity;
 mod resampling;
