@@ -29,7 +29,7 @@ def skew(v: ArrayLike) -> Array:
 
 
 def exponential(v: ArrayLike) -> Array:
-    """Returns the rotation matrix of a rotation vector: the power series of v/256, squared eight times."""
+    """Returns the rotation matrix exp([v]): the power series of v/256, squared eight times."""
     matrix, term = np.eye(3), np.eye(3)
     for k in range(1, 16):
         term = term @ skew(np.asarray(v, float) / 256) / k
@@ -94,7 +94,7 @@ def test_half_turns_are_exact(axis: ArrayLike) -> None:
 
 @given(vectors, st.floats(-10, 10), st.sampled_from(ORDERS), st.sampled_from(["rad", "deg"]))
 def test_axes_and_angles_are_rotation_vectors(v: Array, turn: float, order: Any, unit: Any) -> None:
-    """An axis of any length and an angle are the rotation vector of the unit axis times the angle."""
+    """An axis of any length and an angle are the vector of the unit axis times the angle."""
     norm = np.linalg.norm(v)
     assume(norm > 1e-3)
     q = pre.axis_angles_to_quaternions(v, turn / UNIT[unit], unit=unit, order=order)
@@ -111,7 +111,7 @@ def test_axes_and_angles_are_rotation_vectors(v: Array, turn: float, order: Any,
 def test_euler_angles_are_products_of_elementary_rotations(
     angles: Any, sequence: str, order: Any, unit: Any
 ) -> None:
-    """All sequences, about fixed and moving axes, agree with products of matrices, and come back."""
+    """All sequences, about fixed and moving axes, are products of matrices, and come back."""
     given_angles = np.array(angles) / UNIT[unit]
     q = pre.euler_to_quaternions(given_angles, sequence, unit=unit, order=order)
     matrix = of_euler(angles, sequence)
@@ -127,7 +127,7 @@ def test_euler_angles_are_products_of_elementary_rotations(
 
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_gimbal_lock_is_reported_and_keeps_the_rotation(sequence: str) -> None:
-    """In gimbal lock a warning counts the samples, and the angles are still those of the rotation."""
+    """In gimbal lock a warning counts the samples, and the angles still give the rotation."""
     locks = (0, np.pi) if sequence[0] == sequence[2] else (-np.pi / 2, np.pi / 2)
     for lock in locks:
         angles = [[0.4, lock, 0.7], [0.5, lock, 0.7]]
@@ -186,7 +186,7 @@ def test_transforms_and_poses_are_inverse(v: Array, place: Array, order: Any) ->
 
 
 def test_poses_of_transforms_are_demonstrations() -> None:
-    """Transforms along time become a demonstration with a rotation, and rollouts become transforms."""
+    """Transforms along time become a demonstration, and rollouts become transforms."""
     s = np.linspace(0, 1, 80)
     m = s**3 * (10 - 15 * s + 6 * s**2)
     transforms = np.tile(np.eye(4), (80, 1, 1))
@@ -194,8 +194,8 @@ def test_poses_of_transforms_are_demonstrations() -> None:
     transforms[:, 0, 3] = m
     poses = pre.transforms_to_poses(transforms, order="xyzw")
     demo = pdmp.Demonstration(poses, dt=0.02, rotations={3: "xyzw"})
-    rollout = pdmp.fit([demo]).rollout(duration=79 * 0.02)
-    again = pre.poses_to_transforms(rollout.position[:80], order="xyzw")
+    rollout = pdmp.fit([demo]).rollout(dt=0.02)
+    again = pre.poses_to_transforms(rollout.position, order="xyzw")
     np.testing.assert_allclose(again, transforms, atol=1e-3)
 
 
@@ -244,6 +244,6 @@ NAN = np.full((2, 3, 3), np.nan)
     ],
 )
 def test_bad_orientations_are_refused(call: Any, message: str) -> None:
-    """Wrong shapes, numbers, scales, reflections, axes and sequences are refused with the numbers."""
+    """Wrong shapes, scales, reflections, axes and sequences are refused with the numbers."""
     with pytest.raises(ValueError, match=message):
         call()

@@ -144,8 +144,6 @@ def test_commands_in_the_wrong_shape_are_refused(model: pdmp.Model) -> None:
         model.rollout(velocity=np.zeros(7))
     with pytest.raises(ValueError, match="a rotation has no limits"):
         model.controller(limits=pdmp.Limits(velocity=1.0))
-    with pytest.raises(ValueError, match="bands do not exist"):
-        model.band([0.1])
     with pytest.raises(ValueError, match="Jacobians of angular velocities"):
         model.jacobian("style", derivative=1)
     with pytest.raises(ValueError, match="time_scaling must be linear"):
@@ -254,7 +252,100 @@ def test_preprocessing_keeps_unit_quaternions() -> None:
         pdmp.preprocessing.cycles([demo])
 
 
-def test_evaluation_refuses_rotations() -> None:
-    """Predictions of rotations are not compared."""
-    with pytest.raises(ValueError, match="has rotations"):
-        pdmp.evaluation.evaluate(demonstrations(), contexts=[[-0.4], [-0.1], [0.2], [0.5]])
+def noisy_screws(n: int, seed: int) -> list[pdmp.Demonstration]:
+    """Returns screws of random contexts, whose swing deviates by 0.05 rad from the context."""
+    rng = np.random.default_rng(seed)
+    made = []
+    for context in rng.uniform(-0.5, 0.5, n):
+        poses = screw(context + 0.05 * rng.normal())
+        made.append(
+            pdmp.Demonstration(
+                poses, dt=0.01, names=NAMES, rotations=ROTATIONS, context=[float(context)]
+            )
+        )
+    return made
+
+
+@pytest.mark.parametrize("frame", ["body", "world"])
+def test_bands_contain_new_orientations_with_their_probability(frame: Any) -> None:
+    """Nine of ten new orientations lie within 90 % of bands, also far from the mean path."""
+    model = pdmp.fit(noisy_screws(30, 1), n_styles=2, rotation_frame=frame)
+    inside = []
+    for demo in noisy_screws(200, 2):
+        assert demo.context is not None
+        lower, upper = model.band(demo.context, level=0.9)
+        mean = model.rollout(context=demo.context).position
+        n = min(len(mean), demo.n_samples)
+        assert lower.shape == upper.shape == (len(mean), 6)
+        off = (
+            times(mean[:, 3:] * [1, -1, -1, -1], demo.position[:, 3:])
+            if frame == "body"
+            else (times(demo.position[:, 3:], mean[:, 3:] * [1, -1, -1, -1]))
+        )
+        off *= np.sign(off[:, :1])
+        size = np.linalg.norm(off[:, 1:], axis=1, keepdims=True)
+        vector = 2 * np.arctan2(size, off[:, :1]) * off[:, 1:] / np.maximum(size, 1e-300)
+        middle = slice(n // 4, 3 * n // 4)
+        moving = upper[middle, 3:] > 1e-3
+        within = (lower[middle, 3:] <= vector[middle]) & (vector[middle] <= upper[middle, 3:])
+        inside.append(within[moving].mean())
+    assert 0.85 < np.mean(inside) < 0.95
+
+
+def test_evaluation_separates_metres_and_angles() -> None:
+    """Errors of orientations are geodesic distances in rad, beside distances of the rest."""
+    demos = noisy_screws(16, 3)
+    evaluation = pdmp.evaluate(demos, predictors={"PDMP": pdmp.evaluation.PDMP(n_styles=2)})
+    recordings = evaluation.recordings
+    assert recordings.names == ["x", "y", "z", "qx_rot", "qy_rot", "qz_rot"]
+    for name in ("mean demonstration", "PDMP"):
+        scores = evaluation.score(name)
+        for split, made, distance, angle in zip(
+            evaluation.splits,
+            evaluation.forecasts[name],
+            scores.distance,
+            scores.angle,
+            strict=True,
+        ):
+            predicted = np.array([forecast.position for forecast in made])
+            recorded = recordings.sampled[split.test]
+            turned = angles(predicted[..., 3:], recorded[..., 3:])
+            assert angle == pytest.approx(np.sqrt(np.mean(turned**2)), rel=1e-9)
+            off = np.sum((predicted - recorded)[..., :3] ** 2, axis=-1)
+            assert distance == pytest.approx(np.sqrt(off.mean()), rel=1e-9)
+    learnt, mean = evaluation.summary("PDMP"), evaluation.summary("mean demonstration")
+    assert learnt.angle < 0.3 * mean.angle and learnt.distance < 0.3 * mean.distance
+    assert learnt.error == pytest.approx(learnt.distance**2 + learnt.angle**2)
+    assert "angle [rad]" in repr(evaluation)
+
+
+def test_baselines_predict_unit_quaternions() -> None:
+    """All baselines learn rotations, and a linear map predicts those of linear demonstrations."""
+    evaluation = pdmp.evaluate(noisy_screws(10, 4), max_folds=3)
+    assert not evaluation.skipped
+    for made in evaluation.forecasts.values():
+        for forecast in (forecast for fold in made for forecast in fold):
+            norms = np.linalg.norm(forecast.position[:, 3:], axis=1)
+            np.testing.assert_allclose(norms, 1, atol=1e-9)
+    mean = evaluation.summary("mean demonstration").angle
+    for name in ("PCA, linear map", "ProMP weights, linear map"):
+        assert evaluation.summary(name).angle < 0.25 * mean
+    pytest.importorskip("matplotlib")
+    figure = pdmp.plot.held_out(evaluation, "PDMP")
+    assert "qy_rot [rad]" in {axes.get_ylabel() for axes in figure.axes}
+
+
+def test_evaluation_refuses_other_rotations_and_norms() -> None:
+    """Demonstrations with other rotations, and predicted norms other than 1, are refused."""
+
+    class Doubled:
+        def fit(self, recordings: pdmp.evaluation.Recordings) -> Any:
+            forecast = pdmp.evaluation.Forecast(2 * recordings.sampled[0], 1.0)
+            return lambda _: forecast
+
+    demos = demonstrations()
+    other = pdmp.Demonstration(screw(0.1), dt=0.01, context=[0.1])
+    with pytest.raises(ValueError, match="demo 4: rotations {}, expected {3: 'wxyz'}"):
+        pdmp.evaluate([*demos, other])
+    with pytest.raises(ValueError, match="norms deviate from 1 by 1"):
+        pdmp.evaluate(demos, predictors={"doubled": Doubled()})

@@ -1270,7 +1270,8 @@ class Model:
         Returns
         -------
         lower, upper : ndarray, (T, D)
-            Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom.
+            Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom. Those of a
+            rotation are bounds of the rotation vector in rad from the predicted orientation, in `rotation_frame`.
 
         Raises
         ------
@@ -2907,6 +2908,69 @@ def transforms_to_poses(transforms: ArrayLike, *, order: Literal["wxyz", "xyzw"]
     >>> poses = pdmp.preprocessing.transforms_to_poses(transforms, order="wxyz")
     >>> pdmp.Demonstration(poses, dt=0.01, rotations={3: "wxyz"}).n_dofs
     6
+    """
+
+def to_tangent(reference: ArrayLike, position: ArrayLike, rotations: Mapping[int, str]) -> _Array:
+    """Converts positions to degrees of freedom, whose rotations are rotation vectors from those of a reference.
+
+    Parameters
+    ----------
+    reference, position : array_like, (T, n_coordinates)
+        Positions with unit quaternions.
+    rotations : dict of int to str
+        First column and order of each quaternion, as of `Demonstration`.
+
+    Returns
+    -------
+    ndarray, (T, n_dofs)
+        Rotation vectors in rad in the body frame of the reference; the other coordinates are those of `position`.
+
+    Raises
+    ------
+    ValueError
+        Shapes that differ, or a quaternion whose norm deviates from 1 by more than 1e-3.
+    """
+
+def from_tangent(reference: ArrayLike, dofs: ArrayLike, rotations: Mapping[int, str]) -> _Array:
+    """Converts degrees of freedom relative to a reference to positions: the inverse of `to_tangent`.
+
+    Parameters
+    ----------
+    reference : array_like, (T, n_coordinates)
+        Positions with unit quaternions.
+    dofs : array_like, (T, n_dofs)
+        Degrees of freedom, whose rotations are rotation vectors in rad.
+    rotations : dict of int to str
+        First column and order of each quaternion.
+
+    Returns
+    -------
+    ndarray, (T, n_coordinates)
+
+    Raises
+    ------
+    ValueError
+        As for `to_tangent`.
+    """
+
+def mean_positions(positions: Sequence[ArrayLike], rotations: Mapping[int, str]) -> _Array:
+    """Computes the mean of positions with rotations, their Karcher mean.
+
+    Parameters
+    ----------
+    positions : list of array_like, (T, n_coordinates)
+        Positions with unit quaternions.
+    rotations : dict of int to str
+        First column and order of each quaternion.
+
+    Returns
+    -------
+    ndarray, (T, n_coordinates)
+
+    Raises
+    ------
+    ValueError
+        As for `to_tangent`.
     """
 
 def mean_pose(poses: ArrayLike) -> _Array:  # (..., 7)

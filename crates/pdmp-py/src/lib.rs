@@ -84,6 +84,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(orientation::quaternions_to_rotation_vectors, module)?)?;
     module.add_function(wrap_pyfunction!(orientation::rotation_vectors_to_quaternions, module)?)?;
     module.add_function(wrap_pyfunction!(orientation::transforms_to_poses, module)?)?;
+    module.add_function(wrap_pyfunction!(rotations::from_tangent, module)?)?;
+    module.add_function(wrap_pyfunction!(rotations::mean_positions, module)?)?;
+    module.add_function(wrap_pyfunction!(rotations::to_tangent, module)?)?;
     module.add_function(wrap_pyfunction!(two_arms::absolute_relative, module)?)?;
     module.add_function(wrap_pyfunction!(two_arms::left_right, module)?)?;
     module.add_function(wrap_pyfunction!(two_arms::mean_pose, module)?)?;
