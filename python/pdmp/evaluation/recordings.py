@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pdmp._labels import ROTATION_DOF
+from pdmp._labels import dof_labels
 from pdmp._messages import check_number, check_type, counted, value_error, warn
 from pdmp._native import (
     Demonstration,
@@ -101,14 +101,18 @@ class Recordings:
     @property
     def names(self) -> list[str]:
         """Names of the degrees of freedom; y0, y1, … without any."""
-        names = self.demos[0].names or [f"y{d}" for d in range(self.sampled.shape[2])]
-        return self._of_dofs([f"{name}{ROTATION_DOF}" for name in names], names)
+        return self._labels[0]
 
     @property
     def units(self) -> list[str]:
         """Units of the degrees of freedom; "" without any."""
-        units = self.demos[0].units or [""] * self.sampled.shape[2]
-        return self._of_dofs(["rad"] * len(units), units)
+        return self._labels[1]
+
+    @property
+    def _labels(self) -> tuple[list[str], list[str]]:
+        n, demo = self.sampled.shape[2], self.demos[0]
+        names, units = demo.names or [f"y{d}" for d in range(n)], demo.units or [""] * n
+        return dof_labels(names, units, self.rotations)
 
     @cached_property
     def mean(self) -> Array:
@@ -131,14 +135,6 @@ class Recordings:
     def positions(self, dofs: Array, rows: slice = slice(None)) -> Array:
         """Returns the positions of degrees of freedom about these samples of the mean."""
         return from_tangent(self.mean[rows], dofs, self.rotations) if self.rotations else dofs
-
-    def _of_dofs(self, rotations: list[str], others: list[str]) -> list[str]:
-        """Returns labels of the degrees of freedom from those of the coordinates."""
-        labels = list(others)
-        for column in self.rotations:
-            labels[column : column + 4] = rotations[column : column + 4]
-        scalars = {c + (0 if order == "wxyz" else 3) for c, order in self.rotations.items()}
-        return [label for column, label in enumerate(labels) if column not in scalars]
 
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
         """Returns the recordings of these indices."""
