@@ -27,6 +27,8 @@ def dof_labels(
     scalars = {column + 3 * (order == "xyzw") for column, order in rotations.items()}
     kept = [column for column in range(len(own)) if column not in scalars]
     return [own[column] for column in kept], [own_units[column] for column in kept]
+
+
 DERIVATIVES = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
 """Suffixes of name and unit in the columns of position, velocity and acceleration."""
 
