@@ -142,8 +142,6 @@ def test_commands_in_the_wrong_shape_are_refused(model: pdmp.Model) -> None:
             model.rollouts(goal=np.stack([bad, bad]))
     with pytest.raises(ValueError, match="one value per DoF"):
         model.rollout(velocity=np.zeros(7))
-    with pytest.raises(ValueError, match="bands do not exist"):
-        model.band([0.1])
     with pytest.raises(ValueError, match="Jacobians of angular velocities"):
         model.jacobian("style", derivative=1)
     with pytest.raises(ValueError, match="time_scaling must be linear"):
@@ -307,11 +305,181 @@ def test_preprocessing_keeps_unit_quaternions() -> None:
     times_of = np.arange(len(q)) * 0.0021
     assert angles(q, exact[np.rint(times_of / 1.5 * 100000).astype(int)]).max() < 1e-4
     assert pdmp.preprocessing.unwrap(demo).rotations == {3: "wxyz"}
-    with pytest.raises(ValueError, match="cycles are not found"):
-        pdmp.preprocessing.cycles([demo])
 
 
-def test_evaluation_refuses_rotations() -> None:
-    """Predictions of rotations are not compared."""
-    with pytest.raises(ValueError, match="has rotations"):
-        pdmp.evaluation.evaluate(demonstrations(), contexts=[[-0.4], [-0.1], [0.2], [0.5]])
+def noisy_screws(n: int, seed: int) -> list[pdmp.Demonstration]:
+    """Returns screws of random contexts, whose swing deviates by 0.05 rad from the context."""
+    rng = np.random.default_rng(seed)
+    made = []
+    for context in rng.uniform(-0.5, 0.5, n):
+        poses = screw(context + 0.05 * rng.normal())
+        made.append(
+            pdmp.Demonstration(
+                poses, dt=0.01, names=NAMES, rotations=ROTATIONS, context=[float(context)]
+            )
+        )
+    return made
+
+
+@pytest.mark.parametrize("frame", ["body", "world"])
+def test_bands_contain_new_orientations_with_their_probability(frame: Any) -> None:
+    """Nine of ten new orientations lie within 90 % of bands, also far from the mean path."""
+    model = pdmp.fit(noisy_screws(30, 1), n_styles=2, rotation_frame=frame)
+    inside = []
+    for demo in noisy_screws(200, 2):
+        assert demo.context is not None
+        lower, upper = model.band(demo.context, level=0.9)
+        mean = model.rollout(context=demo.context).position
+        n = min(len(mean), demo.n_samples)
+        assert lower.shape == upper.shape == (len(mean), 6)
+        off = (
+            times(mean[:, 3:] * [1, -1, -1, -1], demo.position[:, 3:])
+            if frame == "body"
+            else (times(demo.position[:, 3:], mean[:, 3:] * [1, -1, -1, -1]))
+        )
+        off *= np.sign(off[:, :1])
+        size = np.linalg.norm(off[:, 1:], axis=1, keepdims=True)
+        vector = 2 * np.arctan2(size, off[:, :1]) * off[:, 1:] / np.maximum(size, 1e-300)
+        middle = slice(n // 4, 3 * n // 4)
+        moving = upper[middle, 3:] > 1e-3
+        within = (lower[middle, 3:] <= vector[middle]) & (vector[middle] <= upper[middle, 3:])
+        inside.append(within[moving].mean())
+    assert 0.85 < np.mean(inside) < 0.95
+
+
+def test_evaluation_separates_metres_and_angles() -> None:
+    """Errors of orientations are geodesic distances in rad, beside distances of the rest."""
+    demos = noisy_screws(16, 3)
+    evaluation = pdmp.evaluate(demos, predictors={"PDMP": pdmp.evaluation.PDMP(n_styles=2)})
+    recordings = evaluation.recordings
+    assert recordings.names == ["x", "y", "z", "qx_rot", "qy_rot", "qz_rot"]
+    for name in ("mean demonstration", "PDMP"):
+        scores = evaluation.score(name)
+        for split, made, distance, angle in zip(
+            evaluation.splits,
+            evaluation.forecasts[name],
+            scores.distance,
+            scores.angle,
+            strict=True,
+        ):
+            predicted = np.array([forecast.position for forecast in made])
+            recorded = recordings.sampled[split.test]
+            turned = angles(predicted[..., 3:], recorded[..., 3:])
+            assert angle == pytest.approx(np.sqrt(np.mean(turned**2)), rel=1e-9)
+            off = np.sum((predicted - recorded)[..., :3] ** 2, axis=-1)
+            assert distance == pytest.approx(np.sqrt(off.mean()), rel=1e-9)
+    learnt, mean = evaluation.summary("PDMP"), evaluation.summary("mean demonstration")
+    assert learnt.angle < 0.3 * mean.angle and learnt.distance < 0.3 * mean.distance
+    assert learnt.error == pytest.approx(learnt.distance**2 + learnt.angle**2)
+    assert "angle [rad]" in repr(evaluation)
+
+
+def test_baselines_predict_unit_quaternions() -> None:
+    """All baselines learn rotations, and a linear map predicts those of linear demonstrations."""
+    evaluation = pdmp.evaluate(noisy_screws(10, 4), max_folds=3)
+    assert not evaluation.skipped
+    for made in evaluation.forecasts.values():
+        for forecast in (forecast for fold in made for forecast in fold):
+            norms = np.linalg.norm(forecast.position[:, 3:], axis=1)
+            np.testing.assert_allclose(norms, 1, atol=1e-9)
+    mean = evaluation.summary("mean demonstration").angle
+    for name in ("PCA, linear map", "ProMP weights, linear map"):
+        assert evaluation.summary(name).angle < 0.25 * mean
+    pytest.importorskip("matplotlib")
+    figure = pdmp.plot.held_out(evaluation, "PDMP")
+    assert "qy_rot [rad]" in {axes.get_ylabel() for axes in figure.axes}
+
+
+def test_evaluation_refuses_other_rotations_and_norms() -> None:
+    """Demonstrations with other rotations, and predicted norms other than 1, are refused."""
+
+    class Doubled:
+        def fit(self, recordings: pdmp.evaluation.Recordings) -> Any:
+            forecast = pdmp.evaluation.Forecast(2 * recordings.sampled[0], 1.0)
+            return lambda _: forecast
+
+    demos = demonstrations()
+    other = pdmp.Demonstration(screw(0.1), dt=0.01, context=[0.1])
+    with pytest.raises(ValueError, match="demo 4: rotations {}, expected {3: 'wxyz'}"):
+        pdmp.evaluate([*demos, other])
+    with pytest.raises(ValueError, match="norms deviate from 1 by 1"):
+        pdmp.evaluate(demos, predictors={"doubled": Doubled()})
+
+
+PERIOD = 1.03
+
+
+def wobble(
+    swing: float, *, turns: int = 0, drift: float = 0.0, noise: float = 0.0, n: int = 1000
+) -> pdmp.Demonstration:
+    """Returns a cyclic recording that swings, and makes full turns per cycle or drifts."""
+    rng = np.random.default_rng(5)
+    t = 0.01 * np.arange(n)
+    phase = 2 * np.pi * t / PERIOD
+    q = times(turn([0, 0, 1], turns * phase + drift * t), turn([1, 0, 0], swing * np.sin(phase)))
+    q = times(q, turn([0, 1, 0], 0.2 * np.cos(2 * phase + 0.3)))
+    v = noise * rng.normal(size=(n, 3))
+    angle = np.linalg.norm(v, axis=1) + 1e-300
+    q = times(q, turn(v / angle[:, None], angle))
+    height = 1 + 0.02 * np.sin(2 * phase) + 1e-3 * noise * rng.normal(size=n)
+    names = ["z", "qw", "qx", "qy", "qz"]
+    poses = np.column_stack([height, q])
+    return pdmp.Demonstration(poses, dt=0.01, names=names, rotations=ROTATIONS)
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2])
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+def test_cycles_of_rotations_are_found_and_closed(turns: int, noise: float) -> None:
+    """Cycles have the period of the rotation, also where quaternions change sign."""
+    recording = wobble(0.4, turns=turns, noise=noise)
+    assert pdmp.preprocessing.period(recording) == pytest.approx(PERIOD, abs=0.002)
+    cycles = pdmp.preprocessing.cycles(recording)
+    assert len(cycles) == 9 and not cycles.rejected and not cycles.growths
+    assert cycles.gains.shape == (9, 4)
+    np.testing.assert_allclose(cycles.periods, PERIOD, atol=0.03 if noise else 1e-3)
+    expected = wobble(0.4, turns=turns).position[:103, 1:]
+    for cycle in cycles:
+        assert angles(cycle.position[:, 1:], expected[: cycle.n_samples]).max() < 6 * noise + 0.01
+    [mean] = pdmp.preprocessing.cycles(recording, average=True)
+    assert angles(mean.position[:, 1:], expected).max() < 2 * noise + 0.01
+    model = pdmp.fit([mean], kind="rhythmic")
+    rollout = model.rollout(dt=0.01, duration=1.02)
+    assert angles(rollout.position[:, 1:], expected).max() < 2 * noise + 0.01
+
+
+def test_gains_of_rotations_are_removed_and_reported() -> None:
+    """A heading that drifts ends where it began in closed cycles, and a large drift is reported."""
+    cycles = pdmp.preprocessing.cycles(wobble(0.4, drift=0.05))
+    np.testing.assert_allclose(
+        np.linalg.norm(cycles.gains[:, 1:], axis=1), 0.05 * PERIOD, rtol=0.01
+    )
+    for cycle in cycles:
+        step = angles(cycle.position[:1, 1:], cycle.position[-1:, 1:])
+        within = angles(cycle.position[1:, 1:], cycle.position[:-1, 1:])
+        assert step < within.max()
+    onsets = PERIOD * np.arange(10)
+    with pytest.warns(UserWarning, match="'qz_rot' gains 0.506 rad in recording 0"):
+        pdmp.preprocessing.cycles(wobble(0.01, drift=0.5), onsets=onsets)
+
+
+@pytest.mark.parametrize("turns", [0, 1])
+def test_styles_of_new_cycles_do_not_depend_on_their_phase(turns: int) -> None:
+    """A new cycle that begins at another phase has the style of the same cycle in phase."""
+    n = round(100 * PERIOD)
+    cycles = [wobble(swing, turns=turns, n=n) for swing in (0.2, 0.3, 0.4, 0.5)]
+    model = pdmp.fit(cycles, kind="rhythmic", n_styles=1)
+    new = wobble(0.35, turns=turns, n=n)
+    style = model.style_of(new)
+    low, high = sorted([model.styles[1, 0], model.styles[2, 0]])
+    assert low < style[0] < high
+    for lead in (7, 30, 51, 80):
+        rolled = np.roll(new.position, -lead, axis=0)
+        shifted = pdmp.Demonstration(rolled, dt=0.01, names=new.names, rotations=ROTATIONS)
+        np.testing.assert_allclose(model.style_of(shifted), style, atol=2e-3)
+    stamped = pdmp.Demonstration(
+        np.roll(new.position, -30, axis=0), time=new.time, names=new.names, rotations=ROTATIONS
+    )
+    np.testing.assert_allclose(model.style_of(stamped, period=PERIOD), style, atol=2e-3)
+    other = wobble(0.35, turns=turns + 1, n=n)
+    with pytest.raises(ValueError, match="degrees from the mean|does not describe"):
+        model.style_of(other)

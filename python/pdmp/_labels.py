@@ -13,6 +13,22 @@ if TYPE_CHECKING:
 
 ROTATION_DOF = "_rot"
 """Suffix of the name of a degree of freedom of a rotation, after that of its column."""
+
+
+def dof_labels(
+    names: Sequence[str], units: Sequence[str], rotations: Mapping[int, str]
+) -> tuple[list[str], list[str]]:
+    """Returns names and units of the degrees of freedom, from those of the coordinates."""
+    own, own_units = list(names), list(units)
+    for column in rotations:
+        four = slice(column, column + 4)
+        own[four] = [f"{name}{ROTATION_DOF}" for name in names[four]]
+        own_units[four] = ["rad"] * 4
+    scalars = {column + 3 * (order == "xyzw") for column, order in rotations.items()}
+    kept = [column for column in range(len(own)) if column not in scalars]
+    return [own[column] for column in kept], [own_units[column] for column in kept]
+
+
 DERIVATIVES = (("", ""), ("_velocity", "/s"), ("_acceleration", "/s²"))
 """Suffixes of name and unit in the columns of position, velocity and acceleration."""
 

@@ -1303,7 +1303,8 @@ class Model:
         Returns
         -------
         lower, upper : ndarray, (T, D)
-            Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom.
+            Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom. Those of a
+            rotation are bounds of the rotation vector in rad from the predicted orientation, in `rotation_frame`.
 
         Raises
         ------
@@ -2753,6 +2754,332 @@ def left_right(
     ------
     ValueError
         As for `absolute_relative`.
+    """
+
+def axis_angles_to_quaternions(
+    axes: ArrayLike,
+    angles: ArrayLike,
+    *,
+    unit: Literal["rad", "deg"],
+    order: Literal["wxyz", "xyzw"],
+) -> _Array:
+    """Converts axes and angles to unit quaternions.
+
+    Parameters
+    ----------
+    axes : array_like, (T, 3) or (3,)
+        Axes of any length along time, or one for all angles.
+    angles : array_like, (T,) or float
+        Angles about them.
+    unit : {"rad", "deg"}
+        Unit of the angles.
+    order : {"wxyz", "xyzw"}
+        Order of the components.
+
+    Returns
+    -------
+    ndarray, (T, 4) or (4,)
+        Quaternions, whose signs are continuous along time.
+
+    Raises
+    ------
+    ValueError
+        Another shape, a number that is not finite, or a turn about an axis of norm below 1e-9.
+
+    Examples
+    --------
+    >>> turn = pdmp.preprocessing.axis_angles_to_quaternions([0, 0, 2], 180, unit="deg", order="wxyz")
+    >>> turn.round(12).tolist()
+    [0.0, 0.0, 0.0, 1.0]
+    """
+
+def euler_to_quaternions(
+    angles: ArrayLike, sequence: str, *, unit: Literal["rad", "deg"], order: Literal["wxyz", "xyzw"]
+) -> _Array:
+    """Converts Euler angles to unit quaternions.
+
+    Parameters
+    ----------
+    angles : array_like, (T, 3) or (3,)
+        Angles along time, or one triple, in the order of the sequence.
+    sequence : str
+        Axes of the three rotations in their order: small letters such as "xyz" for the fixed axes of the world (extrinsic),
+        capital letters such as "ZYX" for the moving axes of the body (intrinsic), as in SciPy. Roll, pitch and yaw are
+        usually "xyz" in this order.
+    unit : {"rad", "deg"}
+        Unit of the angles.
+    order : {"wxyz", "xyzw"}
+        Order of the components.
+
+    Returns
+    -------
+    ndarray, (T, 4) or (4,)
+        Quaternions, whose signs are continuous along time.
+
+    Raises
+    ------
+    ValueError
+        Another shape, a number that is not finite, or a sequence with other letters, capital and small ones, or one axis
+        twice in succession.
+
+    Examples
+    --------
+    >>> angles = [90, 0, 0]
+    >>> pdmp.preprocessing.euler_to_quaternions(angles, "ZYX", unit="deg", order="wxyz").round(4).tolist()
+    [0.7071, 0.0, 0.0, 0.7071]
+    """
+
+def matrices_to_quaternions(matrices: ArrayLike, *, order: Literal["wxyz", "xyzw"]) -> _Array:
+    """Converts rotation matrices to unit quaternions.
+
+    The columns of a matrix are the axes of the body in the world frame. Matrices whose M.T @ M deviates from the identity by
+    at most 1e-3 are replaced by the closest rotation. The signs are continuous along time, from w ≥ 0 in the first sample.
+
+    Parameters
+    ----------
+    matrices : array_like, (T, 3, 3) or (3, 3)
+        Rotation matrices along time, or one.
+    order : {"wxyz", "xyzw"}
+        Order of the components.
+
+    Returns
+    -------
+    ndarray, (T, 4) or (4,)
+
+    Raises
+    ------
+    ValueError
+        Another shape, a number that is not finite, a larger deviation, or a reflection (determinant −1).
+
+    Examples
+    --------
+    >>> pdmp.preprocessing.matrices_to_quaternions(np.diag([1, -1, -1]), order="xyzw").tolist()
+    [1.0, 0.0, 0.0, 0.0]
+    """
+
+def poses_to_transforms(poses: ArrayLike, *, order: Literal["wxyz", "xyzw"]) -> _Array:
+    """Converts poses to homogeneous transforms.
+
+    Parameters
+    ----------
+    poses : array_like, (T, 7) or (7,)
+        Positions x, y, z and unit quaternions along time, or one.
+    order : {"wxyz", "xyzw"}
+        Order of the components of the quaternions.
+
+    Returns
+    -------
+    ndarray, (T, 4, 4) or (4, 4)
+
+    Raises
+    ------
+    ValueError
+        Another shape, a number that is not finite, or a quaternion whose norm deviates from 1 by more than 1e-3.
+    """
+
+def quaternions_to_euler(
+    quaternions: ArrayLike,
+    sequence: str,
+    *,
+    unit: Literal["rad", "deg"],
+    order: Literal["wxyz", "xyzw"],
+) -> _Array:
+    """Converts unit quaternions to Euler angles.
+
+    The first and third angle of the first sample lie within ±180°, the second within ±90° for three different axes, 0° and
+    180° for a repeated one. The other samples have the angles closest to the sample before, so that they have no jumps.
+
+    In gimbal lock, at the bounds of the second angle, only the sum or the difference of the others is determined. Within
+    1e-7 rad of it the third angle is that of the sample before, 0 at first; near it small rotations are large changes of
+    angles.
+
+    Parameters
+    ----------
+    quaternions : array_like, (T, 4) or (4,)
+        Unit quaternions along time, or one.
+    sequence : str
+        Sequence of the axes, as for `euler_to_quaternions`.
+    unit : {"rad", "deg"}
+        Unit of the angles.
+    order : {"wxyz", "xyzw"}
+        Order of the components.
+
+    Returns
+    -------
+    ndarray, (T, 3) or (3,)
+
+    Raises
+    ------
+    ValueError
+        As for `quaternions_to_matrices` and the sequence of `euler_to_quaternions`.
+
+    Warns
+    -----
+    UserWarning
+        Samples in gimbal lock.
+    """
+
+def quaternions_to_matrices(quaternions: ArrayLike, *, order: Literal["wxyz", "xyzw"]) -> _Array:
+    """Converts unit quaternions to rotation matrices.
+
+    Parameters
+    ----------
+    quaternions : array_like, (T, 4) or (4,)
+        Unit quaternions along time, or one.
+    order : {"wxyz", "xyzw"}
+        Order of the components.
+
+    Returns
+    -------
+    ndarray, (T, 3, 3) or (3, 3)
+        Matrices, whose columns are the axes of the body in the world frame.
+
+    Raises
+    ------
+    ValueError
+        Another shape, a number that is not finite, or a norm that deviates from 1 by more than 1e-3.
+    """
+
+def quaternions_to_rotation_vectors(
+    quaternions: ArrayLike, *, order: Literal["wxyz", "xyzw"]
+) -> _Array:
+    """Converts unit quaternions to rotation vectors.
+
+    The first is that of the shortest rotation; of the others, that closest to the sample before, with whole turns added about
+    its axis. A path that passes half a turn has no jump.
+
+    Parameters
+    ----------
+    quaternions : array_like, (T, 4) or (4,)
+        Unit quaternions along time, or one.
+    order : {"wxyz", "xyzw"}
+        Order of the components.
+
+    Returns
+    -------
+    ndarray, (T, 3) or (3,)
+        Rotation vectors in rad.
+
+    Raises
+    ------
+    ValueError
+        As for `quaternions_to_matrices`.
+    """
+
+def rotation_vectors_to_quaternions(
+    vectors: ArrayLike, *, order: Literal["wxyz", "xyzw"]
+) -> _Array:
+    """Converts rotation vectors to unit quaternions.
+
+    Parameters
+    ----------
+    vectors : array_like, (T, 3) or (3,)
+        Rotation vectors along time, or one: the axis times the angle in rad.
+    order : {"wxyz", "xyzw"}
+        Order of the components.
+
+    Returns
+    -------
+    ndarray, (T, 4) or (4,)
+        Quaternions, whose signs are continuous along time.
+
+    Raises
+    ------
+    ValueError
+        Another shape, or a number that is not finite.
+    """
+
+def transforms_to_poses(transforms: ArrayLike, *, order: Literal["wxyz", "xyzw"]) -> _Array:
+    """Converts homogeneous transforms to poses.
+
+    Parameters
+    ----------
+    transforms : array_like, (T, 4, 4) or (4, 4)
+        Transforms from the body frame to the world frame along time, or one, with the last row 0, 0, 0, 1. Their rotations
+        are converted as by `matrices_to_quaternions`.
+    order : {"wxyz", "xyzw"}
+        Order of the components of the quaternions.
+
+    Returns
+    -------
+    ndarray, (T, 7) or (7,)
+        Positions x, y, z and unit quaternions, for a demonstration with `rotations={3: order}`.
+
+    Raises
+    ------
+    ValueError
+        As for `matrices_to_quaternions`, or another last row.
+
+    Examples
+    --------
+    >>> transforms = np.tile(np.eye(4), (50, 1, 1))
+    >>> transforms[:, 2, 3] = np.linspace(0, 0.3, 50)
+    >>> poses = pdmp.preprocessing.transforms_to_poses(transforms, order="wxyz")
+    >>> pdmp.Demonstration(poses, dt=0.01, rotations={3: "wxyz"}).n_dofs
+    6
+    """
+
+def to_tangent(reference: ArrayLike, position: ArrayLike, rotations: Mapping[int, str]) -> _Array:
+    """Converts positions to degrees of freedom, whose rotations are rotation vectors from those of a reference.
+
+    Parameters
+    ----------
+    reference, position : array_like, (T, n_coordinates)
+        Positions with unit quaternions.
+    rotations : dict of int to str
+        First column and order of each quaternion, as of `Demonstration`.
+
+    Returns
+    -------
+    ndarray, (T, n_dofs)
+        Rotation vectors in rad in the body frame of the reference; the other coordinates are those of `position`.
+
+    Raises
+    ------
+    ValueError
+        Shapes that differ, or a quaternion whose norm deviates from 1 by more than 1e-3.
+    """
+
+def from_tangent(reference: ArrayLike, dofs: ArrayLike, rotations: Mapping[int, str]) -> _Array:
+    """Converts degrees of freedom relative to a reference to positions: the inverse of `to_tangent`.
+
+    Parameters
+    ----------
+    reference : array_like, (T, n_coordinates)
+        Positions with unit quaternions.
+    dofs : array_like, (T, n_dofs)
+        Degrees of freedom, whose rotations are rotation vectors in rad.
+    rotations : dict of int to str
+        First column and order of each quaternion.
+
+    Returns
+    -------
+    ndarray, (T, n_coordinates)
+
+    Raises
+    ------
+    ValueError
+        As for `to_tangent`.
+    """
+
+def mean_positions(positions: Sequence[ArrayLike], rotations: Mapping[int, str]) -> _Array:
+    """Computes the mean of positions with rotations, their Karcher mean.
+
+    Parameters
+    ----------
+    positions : list of array_like, (T, n_coordinates)
+        Positions with unit quaternions.
+    rotations : dict of int to str
+        First column and order of each quaternion.
+
+    Returns
+    -------
+    ndarray, (T, n_coordinates)
+
+    Raises
+    ------
+    ValueError
+        As for `to_tangent`.
     """
 
 def mean_pose(poses: ArrayLike) -> _Array:  # (..., 7)

@@ -311,7 +311,8 @@ impl Model {
     /// Returns
     /// -------
     /// lower, upper : ndarray, (T, D)
-    ///     Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom.
+    ///     Bounds at the samples of `rollout(context=context, dt=dt)`, in the unit of each degree of freedom. Those of a
+    ///     rotation are bounds of the rotation vector in rad from the predicted orientation, in `rotation_frame`.
     ///
     /// Raises
     /// ------

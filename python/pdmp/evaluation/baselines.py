@@ -13,12 +13,12 @@ from pdmp.evaluation.recordings import Array, Recordings
 
 
 class MeanDemonstration:
-    """Mean of the demonstrations, for every context."""
+    """Mean of the demonstrations, of rotations their Karcher mean, for every context."""
 
     def fit(self, recordings: Recordings) -> Predict:
         """Averages the demonstrations, and the logarithms of their durations."""
-        mean, m = recordings.sampled.mean(axis=0), recordings.n_demos
-        variance = recordings.sampled.var(axis=0, ddof=1) * (1 + 1 / m) if m > 1 else None
+        mean, m = recordings.mean, recordings.n_demos
+        variance = recordings.dofs.var(axis=0, ddof=1) * (1 + 1 / m) if m > 1 else None
         duration = float(np.exp(np.log(recordings.durations).mean()))
         return lambda _: Forecast(mean, duration, variance)
 
@@ -49,17 +49,19 @@ class MovedGoal:
         alone = recordings[np.array([nominal])]
         model = fit(alone.demos, kind=alone.kind, period=alone.periods)
         discrete = recordings.kind == "discrete"
-        sampled = recordings.sampled
-        ends = [sampled[:, -1], sampled[:, 0]] if discrete else [sampled.mean(axis=1)]
+        dofs = recordings.dofs
+        ends = [dofs[:, -1], dofs[:, 0]] if discrete else [dofs.mean(axis=1)]
+        rows = [slice(-1, None), slice(0, 1)] if discrete else [slice(0, 1)]
         end_map = ContextMap(recordings.contexts.tolist(), np.concatenate(ends, axis=1), "linear")
         duration_at = _duration_map(recordings)
 
         def predict(context: Array) -> Forecast:
             duration = duration_at(context)
-            positions = np.split(end_map.predict([context.tolist()])[0][0], len(ends))
+            predicted = np.split(end_map.predict([context.tolist()])[0], len(ends), axis=1)
+            positions = [recordings.positions(*end)[0] for end in zip(predicted, rows, strict=True)]
             names = ("goal", "start") if discrete else ("anchor",)
             rollout = model.rollout(
-                **dict(zip(names, positions, strict=True)),  # type: ignore[arg-type]
+                **dict(zip(names, positions, strict=True)),
                 tau=model.tau * duration / model.durations[0],
                 dt=recordings.interval(duration),
             )
@@ -89,7 +91,7 @@ class Components:
 
     def __call__(self, recordings: Recordings) -> tuple[Array, Array, Array]:
         """Factorises the differences from the mean."""
-        joint = recordings.sampled.reshape(recordings.n_demos, -1)
+        joint = recordings.dofs.reshape(recordings.n_demos, -1)
         mean = joint.mean(axis=0)
         factors = factorise(joint - mean, singular_value_share=self.share)
         return factors.styles, mean, factors.basis_targets
@@ -114,7 +116,7 @@ class RadialWeights:
         radial = np.exp(-0.5 * (distance / width) ** 2)
         radial /= radial.sum(axis=1, keepdims=True)
         gram = radial.T @ radial + self.ridge * np.eye(self.n_weights)
-        weights: Array = np.linalg.solve(gram, radial.T @ recordings.sampled)  # (M, N, D)
+        weights: Array = np.linalg.solve(gram, radial.T @ recordings.dofs)  # (M, N, D)
         n_dofs = weights.shape[2]
         basis = np.kron(radial.T, np.eye(n_dofs))
         return weights.reshape(recordings.n_demos, -1), np.zeros(n * n_dofs), basis
@@ -131,14 +133,14 @@ class LinearWeights:
         weights, offset, basis = self.encoding(recordings)
         weight_map = ContextMap(recordings.contexts.tolist(), weights, "linear")
         duration_at = _duration_map(recordings)
-        shape = recordings.sampled.shape[1:]
+        shape = recordings.dofs.shape[1:]
 
         def predict(context: Array) -> Forecast:
             mean, covariance = weight_map.predict([context.tolist()])
             variance = None
             if covariance is not None:
                 variance = np.sum(basis * (covariance[0] @ basis), axis=0).reshape(shape)
-            position = (offset + mean[0] @ basis).reshape(shape)
+            position = recordings.positions((offset + mean[0] @ basis).reshape(shape))
             return Forecast(position, duration_at(context), variance)
 
         return predict

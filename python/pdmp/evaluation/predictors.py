@@ -25,6 +25,8 @@ class Forecast(NamedTuple):
         Duration, or period [s].
     variance : ndarray (C, D), optional
         Variance of each position of a new movement in this context; None if it is not predicted.
+        With rotations, a column for each degree of freedom: those of a rotation are variances of
+        the rotation vector [rad²] from the predicted orientation, in the frame that rotates.
     """
 
     position: Array
@@ -75,6 +77,8 @@ class PDMP:
             **self.settings,
         )
         n_samples = recordings.n_samples
+        if recordings.rotations:
+            model = model.in_frame("body")
 
         def predict(context: Array) -> Forecast:
             condition = context.tolist()

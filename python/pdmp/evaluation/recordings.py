@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pdmp._labels import dof_labels
 from pdmp._messages import check_number, check_type, counted, value_error, warn
-from pdmp._native import Demonstration, Trajectory, context_rows, inspected
+from pdmp._native import (
+    Demonstration,
+    Trajectory,
+    context_rows,
+    from_tangent,
+    inspected,
+    mean_positions,
+    to_tangent,
+)
 
 Array: TypeAlias = NDArray[Any]  # of float64
 Demos: TypeAlias = (
@@ -38,7 +48,8 @@ class Recordings:
     durations : ndarray (M,)
         Durations, or periods [s].
     sampled : ndarray (M, C, D)
-        Positions at C samples of normalised time, with both ends if discrete.
+        Positions at C samples of normalised time, with both ends if discrete; with rotations, a
+        column for each coordinate.
     """
 
     demos: tuple[Demonstration, ...]
@@ -78,14 +89,53 @@ class Recordings:
         return duration / (self.n_samples - (self.kind == "discrete"))
 
     @property
+    def rotations(self) -> Mapping[int, str]:
+        """First column and order of each unit quaternion among the coordinates."""
+        return self.demos[0].rotations
+
+    @property
+    def rotation_dofs(self) -> NDArray[np.intp]:
+        """Degrees of freedom of the rotations."""
+        firsts = [column - r for r, column in enumerate(sorted(self.rotations))]
+        return np.array([dof + i for dof in firsts for i in range(3)], np.intp)
+
+    @property
     def names(self) -> list[str]:
         """Names of the degrees of freedom; y0, y1, … without any."""
-        return self.demos[0].names or [f"y{d}" for d in range(self.sampled.shape[2])]
+        return self._labels[0]
 
     @property
     def units(self) -> list[str]:
         """Units of the degrees of freedom; "" without any."""
-        return self.demos[0].units or [""] * self.sampled.shape[2]
+        return self._labels[1]
+
+    @property
+    def _labels(self) -> tuple[list[str], list[str]]:
+        n, demo = self.sampled.shape[2], self.demos[0]
+        names, units = demo.names or [f"y{d}" for d in range(n)], demo.units or [""] * n
+        return dof_labels(names, units, self.rotations)
+
+    @cached_property
+    def mean(self) -> Array:
+        """Mean of the movements (C, D), about which degrees of freedom describe rotations."""
+        if not self.rotations:
+            return np.asarray(self.sampled.mean(axis=0))
+        return mean_positions(list(self.sampled), self.rotations)
+
+    @cached_property
+    def dofs(self) -> Array:
+        """Degrees of freedom (M, C, n_dofs): rotation vectors from the mean [rad], and others."""
+        if not self.rotations:
+            return self.sampled
+        return np.array([self.relative(self.mean, position) for position in self.sampled])
+
+    def relative(self, reference: Array, position: Array) -> Array:
+        """Returns degrees of freedom (C, n_dofs), with rotation vectors from a reference."""
+        return to_tangent(reference, position, self.rotations) if self.rotations else position
+
+    def positions(self, dofs: Array, rows: slice = slice(None)) -> Array:
+        """Returns the positions of degrees of freedom about these samples of the mean."""
+        return from_tangent(self.mean[rows], dofs, self.rotations) if self.rotations else dofs
 
     def __getitem__(self, rows: NDArray[np.intp]) -> Recordings:
         """Returns the recordings of these indices."""
@@ -117,8 +167,10 @@ def recordings(
     if not valid:
         raise ValueError("demos is empty: pass at least two demonstrations")
     for m, demo in enumerate(valid):
-        if demo.rotations:
-            raise ValueError(f"demo {m}: has rotations, for which predictions are not compared")
+        if demo.rotations != valid[0].rotations:
+            raise value_error(
+                f"demo {m}: rotations {demo.rotations}, expected {valid[0].rotations}"
+            )
         if demo.n_dofs != valid[0].n_dofs:
             raise value_error(f"demo {m}: expected {valid[0].n_dofs} DoFs, found {demo.n_dofs}")
     inspected_demos, findings = inspected(list(valid), dt=dt)
@@ -172,8 +224,22 @@ def _resample(
             )
         duration = cycle
     grid = np.linspace(0, duration, n_samples, endpoint=kind == "discrete")
-    columns = [np.interp(grid, time, column, period=cycle) for column in demo.position.T]
+    position = demo.position
+    columns = [np.interp(grid, time, column, period=cycle) for column in position.T]
+    for column in demo.rotations:
+        four = slice(column, column + 4)
+        columns[four] = _interpolate_rotation(grid, time, position[:, four], cycle)
     return duration, np.transpose(columns)
+
+
+def _interpolate_rotation(grid: Array, time: Array, q: Array, cycle: float | None) -> list[Array]:
+    """Returns the components (4, C) of unit quaternions of continuous signs, interpolated."""
+    if cycle is not None:
+        # The sign of a quaternion may change over the cycle.
+        closing = q[:1] if q[0] @ q[-1] >= 0 else -q[:1]
+        time, q = np.append(time, cycle), np.concatenate([q, closing])
+    components = np.array([np.interp(grid, time, component) for component in q.T])
+    return list(components / np.linalg.norm(components, axis=0))
 
 
 def _contexts(demos: Sequence[Demonstration], contexts: object) -> Array:

@@ -17,6 +17,7 @@ from pdmp.evaluation.splits import Reach, Split
 
 REFERENCE = "mean demonstration"
 HEADER = ("predictor", "E", "± sd", "E / mean's", "± se", f"in {BAND:.0%} band", "duration off")
+ROTATION_HEADER = ("distance", "angle [rad]")
 
 
 class Scores(NamedTuple):
@@ -30,11 +31,18 @@ class Scores(NamedTuple):
         Relative error of the duration, |T̂ - T| / T.
     coverage : ndarray (S,)
         Share of the positions inside the 90 % band; NaN if no variance is predicted.
+    distance : ndarray (S,)
+        Root mean square distance over the degrees of freedom that are no part of a rotation, in
+        their unit.
+    angle : ndarray (S,)
+        Root mean square geodesic distance of the orientations [rad]; NaN without rotations.
     """
 
     error: Array
     duration: Array
     coverage: Array
+    distance: Array
+    angle: Array
 
 
 class Summary(NamedTuple):
@@ -52,6 +60,9 @@ class Summary(NamedTuple):
         Share of the positions inside the 90 % band; NaN if no variance is predicted.
     duration : float
         Relative error of the duration, |T̂ - T| / T.
+    distance, angle : float
+        Root mean squares of the distance without rotations, and of the angle of the rotations
+        [rad].
     """
 
     n: int
@@ -62,6 +73,8 @@ class Summary(NamedTuple):
     relative_error: float
     coverage: float
     duration: float
+    distance: float
+    angle: float
 
 
 class Comparison(NamedTuple):
@@ -116,7 +129,9 @@ class Evaluation:
     def summary(self, predictor: str, reach: Reach | None = None) -> Summary:
         """Returns the means of one predictor over the splits of one reach, or over all splits."""
         rows = self._rows(reach)
-        error, duration, coverage = (values[rows] for values in self.score(predictor))
+        error, duration, coverage, distance, angle = (
+            values[rows] for values in self.score(predictor)
+        )
         reference = self.scores[REFERENCE].error[rows]
         level = float(reference.mean()) or nan
         relative = float(error.mean()) / level
@@ -130,6 +145,8 @@ class Evaluation:
             _standard_error(error - relative * reference) / level,
             float(coverage.mean()),
             float(duration.mean()),
+            sqrt(np.mean(distance**2)),
+            sqrt(np.mean(angle**2)),
         )
 
     def compare(self, a: str, b: str, reach: Reach | None = None) -> Comparison:
@@ -143,14 +160,21 @@ class Evaluation:
         present = {split.reach for split in self.splits}
         return [reach for reach in ("interpolation", "extrapolation") if reach in present]
 
+    @property
+    def header(self) -> tuple[str, ...]:
+        """Titles of the columns of `table`."""
+        return HEADER + (ROTATION_HEADER if self.recordings.rotations else ())
+
     def table(self, reach: Reach) -> list[list[str]]:
-        """Returns a row per predictor over the splits of one reach; `HEADER` has the columns."""
+        """Returns a row per predictor over the splits of one reach; `header` has the columns."""
         rows = []
         for name in self.scores:
             mean = self.summary(name, reach)
             errors = (mean.error, mean.deviation, mean.relative, mean.relative_error)
             shares = (mean.coverage, mean.duration)
-            rows.append([printable(name), *map(_number, errors), *map(_percent, shares)])
+            apart = (mean.distance, mean.angle) if self.recordings.rotations else ()
+            numbers = [*map(_number, errors), *map(_percent, shares), *map(_number, apart)]
+            rows.append([printable(name), *numbers])
         return rows
 
     def markdown(self) -> str:
@@ -160,7 +184,7 @@ class Evaluation:
             lines += [
                 f"**{self._title(reach)}**",
                 "",
-                markdown_table(HEADER, self.table(reach)),
+                markdown_table(self.header, self.table(reach)),
                 "",
             ]
         return "\n".join([*lines, *self._notes()])
@@ -169,7 +193,7 @@ class Evaluation:
         """Returns the tables as text."""
         lines = []
         for reach in self.reaches():
-            cells = [list(map(_plain, row)) for row in (HEADER, *self.table(reach))]
+            cells = [list(map(_plain, row)) for row in (self.header, *self.table(reach))]
             widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
             lines.append(self._title(reach))
             for first, *others in cells:
@@ -201,17 +225,24 @@ def score(
 ) -> Scores:
     """Returns the scores of forecasts of the held-out demonstrations."""
     rows = []
+    turning = recordings.rotation_dofs
     for split, predicted in zip(splits, forecasts, strict=True):
         each = []
         for m, forecast in zip(split.test, predicted, strict=True):
-            error = forecast.position - recordings.sampled[m]
+            recorded = recordings.relative(forecast.position, recordings.sampled[m])
+            error = recorded - recordings.relative(forecast.position, forecast.position)
             coverage = nan
             if forecast.variance is not None:
                 coverage = float(np.mean(error**2 <= HALF_WIDTH**2 * forecast.variance))
             duration = abs(forecast.duration / recordings.durations[m] - 1)
-            each.append((np.sum(error**2, axis=1).mean(), duration, coverage))
+            squares = np.mean(error**2, axis=0)
+            angle = np.sum(squares[turning]) / max(len(recordings.rotations), 1)
+            distance = np.sum(np.delete(squares, turning))
+            each.append((np.sum(error**2, axis=1).mean(), duration, coverage, distance, angle))
         rows.append(np.mean(each, axis=0))
-    return Scores(*np.transpose(rows))
+    error, duration, coverage, distance, angle = np.transpose(rows)
+    angles = np.sqrt(angle) if turning.size else np.full(len(rows), nan)
+    return Scores(error, duration, coverage, np.sqrt(distance), angles)
 
 
 def _deviation(values: Array) -> float:

@@ -70,7 +70,10 @@ def evaluate(
 
         E = (1/C) Σ ‖ŷ(t) - y(t)‖²;
 
-    that of a fold is the mean over its demonstrations. The relative error of the duration,
+    that of a fold is the mean over its demonstrations. The difference of two orientations is the
+    rotation vector [rad] from one to the other, whose length is the geodesic distance; E then adds
+    squares of different units, which `Scores.distance` and `Scores.angle` separate. The relative
+    error of the duration,
     |T̂ - T| / T, is reported separately. Demonstrations of equal context form one condition. Each
     condition is held out in turn. More than `max_folds` conditions are partitioned into
     `max_folds` folds of neighbours: the fold with the most conditions is halved along its longest
@@ -181,11 +184,11 @@ def _forecasts(
             learnt[key] = predictor.fit(data[split.train])
         forecasts.append([learnt[key](data.contexts[m]) for m in split.test])
         for forecast in forecasts[-1]:
-            _check_forecast(name, forecast, data.sampled.shape[1:])
+            _check_forecast(name, forecast, data)
     return forecasts
 
 
-def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> None:
+def _check_forecast(name: str, forecast: Forecast, data: Recordings) -> None:
     if not isinstance(forecast, Forecast):
         raise value_error(
             f"predictors: '{name}' returns a {type(forecast).__name__}, expected an "
@@ -193,6 +196,7 @@ def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> No
         )
     for kind in ("position", "variance"):
         values = getattr(forecast, kind)
+        shape = (data.sampled if kind == "position" else data.dofs).shape[1:]
         if kind == "variance" and values is None:
             continue
         if np.shape(values) != shape:
@@ -202,6 +206,12 @@ def _check_forecast(name: str, forecast: Forecast, shape: tuple[int, ...]) -> No
             )
         if not np.isfinite(values).all():
             raise value_error(f"predictors: '{name}' predicts a {kind} that is not finite")
+    for column in data.rotations:
+        norms = np.linalg.norm(forecast.position[:, column : column + 4], axis=1)
+        if (off := np.abs(norms - 1).max()) > 1e-3:
+            raise value_error(
+                f"predictors: '{name}' predicts quaternions whose norms deviate from 1 by {off:.3g}"
+            )
 
 
 def _check_labels(data: Recordings, splits: Sequence[Split]) -> None:

@@ -90,7 +90,7 @@ def held_out(
     """Draws predictions with their 90 % band, and the held-out demonstrations.
 
     A column per reach has the first condition of the fold of median E; a row per degree of freedom,
-    at most the six that vary most.
+    at most the six that vary most. Those of a rotation are rotation vectors from the prediction.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def held_out(
     recordings = evaluation.recordings
     units = [unit] * len(recordings.names) if unit else recordings.units
     labels = dof_labels(recordings.names, units)
-    spread = np.ptp(recordings.sampled, axis=(0, 1))
+    spread = np.ptp(recordings.dofs, axis=(0, 1))
     dofs = np.sort(np.argsort(-spread, kind="stable")[:MAX_DOFS])
     duration = "duration" if recordings.kind == "discrete" else "period"
     reaches = evaluation.reaches()
@@ -130,10 +130,12 @@ def held_out(
         test, forecast = evaluation.splits[median].test, evaluation.forecasts[predictor][median][0]
         context = recordings.contexts[test[0]]
         repeated = test[(recordings.contexts[test] == context).all(axis=1)]
+        predicted = recordings.relative(forecast.position, forecast.position)
+        traces = [recordings.relative(forecast.position, y) for y in recordings.sampled[repeated]]
         for axes, dof in zip(column, dofs, strict=True):
-            for trace in recordings.sampled[repeated, :, dof]:
-                axes.plot(phase, trace, color=GREY, linewidth=1.5, label="held out")
-            mean = forecast.position[:, dof]
+            for trace in traces:
+                axes.plot(phase, trace[:, dof], color=GREY, linewidth=1.5, label="held out")
+            mean = predicted[:, dof]
             if forecast.variance is not None:
                 half = HALF_WIDTH * np.sqrt(forecast.variance[:, dof])
                 band = {"color": BLUE, "alpha": 0.15, "linewidth": 0}

@@ -7,9 +7,25 @@ converts cyclic recordings to demonstrations of a rhythmic primitive::
 
     cycles = pdmp.preprocessing.cycles(pdmp.io.read_csv("walk.csv"))
     model = pdmp.fit(cycles, kind="rhythmic")
+
+Orientations are arrays along time: `matrices_to_quaternions`, `rotation_vectors_to_quaternions`,
+`axis_angles_to_quaternions`, `euler_to_quaternions` and `transforms_to_poses` give the columns that
+`pdmp.Demonstration(..., rotations=...)` declares, `quaternions_to_matrices`,
+`quaternions_to_rotation_vectors`, `quaternions_to_euler` and `poses_to_transforms` convert back.
 """
 
 from pdmp import _native
+from pdmp._native import (
+    axis_angles_to_quaternions,
+    euler_to_quaternions,
+    matrices_to_quaternions,
+    poses_to_transforms,
+    quaternions_to_euler,
+    quaternions_to_matrices,
+    quaternions_to_rotation_vectors,
+    rotation_vectors_to_quaternions,
+    transforms_to_poses,
+)
 from pdmp.preprocessing import angles
 from pdmp.preprocessing._vectorized import vectorized
 from pdmp.preprocessing.cyclic import Cycles, Growth, Rejected, cycles
@@ -25,11 +41,20 @@ __all__ = [
     "Cycles",
     "Growth",
     "Rejected",
+    "axis_angles_to_quaternions",
     "cycles",
+    "euler_to_quaternions",
     "lowpass",
+    "matrices_to_quaternions",
     "period",
+    "poses_to_transforms",
+    "quaternions_to_euler",
+    "quaternions_to_matrices",
+    "quaternions_to_rotation_vectors",
     "resample",
+    "rotation_vectors_to_quaternions",
     "split_at",
+    "transforms_to_poses",
     "trim",
     "unwrap",
 ]

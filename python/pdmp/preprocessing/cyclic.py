@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pdmp import _native
+from pdmp._labels import dof_labels
 from pdmp._messages import value_error, warn
 from pdmp._native import Demonstration
 
@@ -53,7 +54,8 @@ class Cycles(Sequence[Demonstration]):
     rejected : list of Rejected
         Rejected cycles, and recordings without a period, with the reasons.
     gains : (K, D) array
-        Gain of each degree of freedom over each cycle, before its removal.
+        Gain of each degree of freedom over each cycle, before its removal; three columns of rad for
+        each rotation.
     growths : list of Growth
         Degrees of freedom that turn, or whose gain per cycle exceeds their range within it.
     """
@@ -121,6 +123,11 @@ def cycles(
     within it, such as the distance walked, a warning reports the gain: a model of closed cycles
     stays in place.
 
+    The gain of a rotation is the rotation vector from the orientation at the start to that at the
+    end of the cycle, removed in the body frame; full turns per cycle are no gain, as they end in
+    the same orientation. Cycles of rotations are found and compared by the elements of rotation
+    matrices, on which the signs of quaternions have no effect.
+
     A cycle is rejected if its period differs from the median of its recording by more than 3.5
     robust standard deviations and 10 %, or if the distance of its shape from the median cycle
     exceeds the median distance by 3.5 robust standard deviations and by a factor of two, and
@@ -187,12 +194,15 @@ def cycles(
 
 def _gains(growths: list[Growth], demos: list[Demonstration]) -> str:
     """Returns a warning about gains from cycle to cycle."""
-    names, units = (demos[0].names, demos[0].units) if demos else (None, None)
+    n = demos[0].n_coordinates if demos else 0
+    names = (demos[0].names if demos else None) or [f"y{d}" for d in range(n)]
+    units = (demos[0].units if demos else None) or [""] * n
+    names, units = dof_labels(names, units, demos[0].rotations if demos else {})
     gains = []
     for dof in sorted({growth.dof for growth in growths}):
         largest = max((g for g in growths if g.dof == dof), key=lambda growth: abs(growth.gain))
         name = names[dof] if names else f"y{dof}"
-        unit = f" {units[dof]}" if units and units[dof] else ""
+        unit = f" {units[dof]}" if names and units[dof] else ""
         gains.append(f"'{name}' gains {largest.gain:.3g}{unit} in recording {largest.recording}")
     return (
         f"more is gained per cycle than moved within one: {', '.join(gains)}; closed cycles lack "

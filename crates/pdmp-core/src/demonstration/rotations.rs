@@ -75,6 +75,22 @@ impl RotationColumns {
     }
 }
 
+/// Returns the columns and DoFs (column, DoF) of the coordinates that are no part of a rotation, and the first DoF of each
+/// rotation.
+pub(crate) fn layout(n_coordinates: usize, rotations: &[RotationColumns]) -> (Vec<[usize; 2]>, Vec<usize>) {
+    let (mut plain, mut firsts, mut column, mut dof) = (Vec::new(), Vec::new(), 0, 0);
+    while column < n_coordinates {
+        if rotations.iter().any(|rotation| rotation.column == column) {
+            firsts.push(dof);
+            (column, dof) = (column + 4, dof + 3);
+        } else {
+            plain.push([column, dof]);
+            (column, dof) = (column + 1, dof + 1);
+        }
+    }
+    (plain, firsts)
+}
+
 impl Demonstration {
     /// Declares columns that are unit quaternions. Their norms become 1, and their signs continuous along time.
     ///

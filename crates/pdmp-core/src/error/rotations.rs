@@ -48,6 +48,52 @@ pub enum RotationError {
         /// The relative rotation, a unit quaternion w, x, y, z.
         relative: [f64; 4],
     },
+    /// A matrix that is no rotation.
+    #[error(
+        "{name}[{index}]: the product of the transposed matrix and the matrix deviates from the identity by {}, more than 1e-3: a \
+         rotation matrix has orthogonal columns of length 1; check the order of its nine numbers, and divide out scales",
+        Rounded(*deviation)
+    )]
+    Matrix {
+        /// The argument.
+        name: &'static str,
+        /// Index of the matrix.
+        index: usize,
+        /// Largest element of the deviation.
+        deviation: f64,
+    },
+    /// An orthogonal matrix that mirrors.
+    #[error(
+        "{name}[{index}]: the determinant is -1: the matrix mirrors, which no rotation does; change the sign of one axis of a \
+         left-handed frame first"
+    )]
+    Reflection {
+        /// The argument.
+        name: &'static str,
+        /// Index of the matrix.
+        index: usize,
+    },
+    /// A homogeneous transform with another last row than 0, 0, 0, 1.
+    #[error(
+        "transforms[{index}] has the last row {row:?}, expected [0.0, 0.0, 0.0, 1.0]: the position is the last column; transpose \
+         transforms that are stored by columns"
+    )]
+    LastRow {
+        /// Index of the transform.
+        index: usize,
+        /// Its last row.
+        row: [f64; 4],
+    },
+    /// A turn about an axis without direction.
+    #[error("axes[{index}] has norm {}: a turn by {angle} rad needs an axis; give one, or the angle 0", Rounded(*norm))]
+    ZeroAxis {
+        /// Index of the axis.
+        index: usize,
+        /// Its norm.
+        norm: f64,
+        /// The angle about it, in rad.
+        angle: f64,
+    },
 }
 
 impl RotationError {
@@ -55,15 +101,25 @@ impl RotationError {
     pub(super) fn next_step(&self) -> ErrorKind {
         match self {
             Self::Norm { row: None, .. } | Self::OppositeArms { .. } => ErrorKind::Argument,
-            Self::Norm { .. } | Self::HalfTurn { .. } => ErrorKind::Data,
+            Self::Norm { .. }
+            | Self::HalfTurn { .. }
+            | Self::Matrix { .. }
+            | Self::Reflection { .. }
+            | Self::LastRow { .. }
+            | Self::ZeroAxis { .. } => ErrorKind::Data,
         }
     }
 
     /// Returns the argument at fault.
     pub(super) fn at_fault(&self) -> &str {
         match self {
-            Self::Norm { name, .. } | Self::OppositeArms { name, .. } => name,
+            Self::Norm { name, .. }
+            | Self::OppositeArms { name, .. }
+            | Self::Matrix { name, .. }
+            | Self::Reflection { name, .. } => name,
             Self::HalfTurn { .. } => "position",
+            Self::LastRow { .. } => "transforms",
+            Self::ZeroAxis { .. } => "axes",
         }
     }
 }

@@ -1,9 +1,16 @@
 //! Phase shift of a cycle relative to the cycles of a model.
+//!
+//! The residual rotations of a cycle depend on its phase, as the mean rotation does: before they are known, the phase is that
+//! in which the cycle is closest to the mean rotations, by the sum of sin²(θ/2) over its samples.
 
 use faer::Mat;
 use ndarray::{Array1, ArrayView1, ArrayView2, Axis};
 
+use crate::demonstration::{Demonstration, Sampling};
+use crate::error::Result;
+use crate::model::Coordinates;
 use crate::numerics::orthonormal_span::OrthonormalSpan;
+use crate::numerics::rotation::{Quaternion, dot};
 
 /// Number of phases of the coarse search, which a search sample by sample around the best one follows.
 const N_PHASES: usize = 128;
@@ -44,6 +51,49 @@ pub(super) fn phase_lead(design: &Mat<f64>, target: &[f64], styles: ArrayView2<f
     let total = target.dot(&target);
     let better = total - most < MAX_RESIDUAL_RATIO * (total - explained(0));
     if better || !agrees_with_mean(0) { lead } else { 0 }
+}
+
+/// Returns the number of samples by which a cycle with rotations precedes the mean rotations of a model, whose phase at each
+/// sample is given in radians.
+pub(super) fn lead_before_mean(demo: &Demonstration, phases: &[f64], coordinates: &Coordinates) -> usize {
+    let n = phases.len();
+    let pairs: Vec<[Vec<Quaternion>; 2]> = coordinates
+        .rotations()
+        .iter()
+        .map(|rotation| {
+            let rows = demo.position();
+            let recorded = rows.rows().into_iter().map(|row| rotation.columns.read(&row.to_vec())).collect();
+            [recorded, phases.iter().map(|&u| rotation.mean.at(u).rotation).collect()]
+        })
+        .collect();
+    let off = |lead: usize| {
+        let of_sample = |c: usize| pairs.iter().map(move |[q, mean]| 1.0 - dot(q[(c + lead) % n], mean[c]).powi(2));
+        (0..n).flat_map(of_sample).sum::<f64>()
+    };
+    let best = |leads: &mut dyn Iterator<Item = usize>| {
+        leads.map(|lead| (lead, off(lead))).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
+    };
+    let stride = n.div_ceil(N_PHASES);
+    let (near, _) = best(&mut (0..n).step_by(stride));
+    let (lead, least) = best(&mut (0..2 * stride + 1).map(|k| (near + n + k - stride) % n));
+    if least < MAX_RESIDUAL_RATIO * off(0) { lead } else { 0 }
+}
+
+/// Returns a cycle that begins at one of its samples, given their times and the period in seconds.
+///
+/// # Errors
+/// As for [`Demonstration::new`].
+pub(super) fn beginning_at(demo: &Demonstration, lead: usize, times: &[f64], period: f64) -> Result<Demonstration> {
+    let n = times.len();
+    let rows: Vec<usize> = (0..n).map(|c| (c + lead) % n).collect();
+    let sampling = match demo.sampling() {
+        Sampling::Stamped { .. } => {
+            let time = |&row: &usize| times[row] - times[lead] + if row < lead { period } else { 0.0 };
+            Sampling::Stamped { time: rows.iter().map(time).collect() }
+        }
+        regular => regular.clone(),
+    };
+    demo.part(demo.position().select(Axis(0), &rows), sampling)
 }
 
 /// Returns the forcing (C·D) of the mean style, if that of every demonstration correlates positively with it.

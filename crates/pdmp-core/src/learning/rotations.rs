@@ -13,7 +13,6 @@ use super::options::{DofScaling, FitOptions};
 use crate::demonstration::{Demonstration, RotationColumns};
 use crate::dynamics::mean_rotation::{MAX_CELLS, MeanRotation};
 use crate::error::{Error, Result, RotationError};
-use crate::kind::Kind;
 use crate::model::Primitive;
 use crate::model::coordinates::{Coordinates, Frame, layout};
 use crate::model::finding::Finding;
@@ -202,17 +201,12 @@ impl Residuals {
 /// Returns a demonstration in the degrees of freedom of a model.
 ///
 /// # Errors
-/// A cycle, whose phase is unknown, rotations that are not those of the model, or a residual rotation of half a turn.
+/// Rotations that are not those of the model, or a residual rotation of half a turn.
 pub(super) fn about_means(
     demo: &Demonstration,
     coordinates: &Coordinates,
     alignment: &Alignment,
 ) -> Result<Demonstration> {
-    if coordinates.dofs().kind() == Kind::Rhythmic {
-        let problem =
-            "has rotations, whose mean depends on the phase: styles of cycles can be inferred without rotations only";
-        return Err(Error::Argument { name: "model", problem });
-    }
     if demo.rotations() != coordinates.columns() {
         return Err(Error::Argument { name: "rotations", problem: "differ from those of the model" });
     }

@@ -12,8 +12,8 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::Alignment;
 use crate::learning::targets::Targets;
-use crate::model::Model;
 use crate::model::conditions::Conditions;
+use crate::model::{Coordinates, Model};
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::threads::Threads;
@@ -26,6 +26,8 @@ const MAX_STYLE: f64 = 10.0;
 /// Largest relative deviation from a demonstration, by root mean square over time and DoFs, each scaled by its range. With
 /// this limit 109 of 124 held-out demonstrations of recorded sets are accepted, and 39 of 96 of other tasks.
 const MAX_DEVIATION: f64 = 0.5;
+/// Largest number of shifts of a cycle with rotations to the phase of the model, the first of which is mostly the last.
+const MAX_SHIFTS: usize = 4;
 /// Largest truncation error of the forcing relative to that of the demonstrations, by root mean square.
 const MAX_TRUNCATION_RATIO: f64 = 3.0;
 
@@ -94,7 +96,6 @@ impl StyleOptions {
 /// ```
 pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> Result<Vec<f64>> {
     let primitive = model.primitive();
-    let n_dofs = model.n_dofs();
     check_length("demonstration", demo.n_coordinates(), primitive.n_coordinates(), primitive.per_coordinate())?;
     let own = [primitive.coordinate_names(), primitive.coordinate_units()];
     for (name, labels, own) in [("names", demo.names(), own[0]), ("units", demo.units(), own[1])] {
@@ -112,10 +113,63 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
         vectors: Vec::new(),
     };
     if let Some(coordinates) = primitive.coordinates() {
-        let residuals = rotations::about_means(demo, coordinates, &alignment)?;
         let inside = Model { primitive: Arc::clone(primitive.inside()), ..model.clone() };
-        return style_of(&inside, &residuals, options);
+        return style_about_means(&inside, demo, coordinates, &alignment, options);
     }
+    let Estimate { style, described, .. } = estimate(model, demo, &alignment, options)?;
+    described.map(|()| style)
+}
+
+/// Style of a demonstration.
+struct Estimate {
+    style: Vec<f64>,
+    /// Share of a cycle by which it precedes those of the model.
+    lead: f64,
+    /// An error if the model does not describe the demonstration.
+    described: Result<()>,
+}
+
+/// Estimates the style of a demonstration with rotations by the model of the degrees of freedom. The residual rotations of
+/// a cycle are those about the mean rotations in its phase.
+fn style_about_means(
+    inside: &Model,
+    demo: &Demonstration,
+    coordinates: &Coordinates,
+    alignment: &Alignment,
+    options: &StyleOptions,
+) -> Result<Vec<f64>> {
+    let mut shifted = None;
+    let mut shifts = 0;
+    loop {
+        let demo = shifted.as_ref().unwrap_or(demo);
+        let aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
+        let (times, duration) = (aligned.seconds(0), aligned.durations()[0]);
+        let lead = if inside.kind() == Kind::Rhythmic && shifts == 0 {
+            if demo.rotations() == coordinates.columns() {
+                let phases: Vec<f64> = times.iter().map(|t| std::f64::consts::TAU * t / duration).collect();
+                cycle_phase::lead_before_mean(demo, &phases, coordinates)
+            } else {
+                0
+            }
+        } else {
+            let residuals = rotations::about_means(demo, coordinates, alignment)?;
+            let Estimate { style, lead, described } = estimate(inside, &residuals, alignment, options)?;
+            let lead = (lead * times.len() as f64).round() as usize % times.len();
+            if lead == 0 || shifts == MAX_SHIFTS {
+                return described.map(|()| style);
+            }
+            lead
+        };
+        shifts += 1;
+        if lead > 0 {
+            shifted = Some(cycle_phase::beginning_at(demo, lead, &times, duration)?);
+        }
+    }
+}
+
+/// Estimates the style of a demonstration whose columns are the degrees of freedom.
+fn estimate(model: &Model, demo: &Demonstration, alignment: &Alignment, options: &StyleOptions) -> Result<Estimate> {
+    let n_dofs = model.n_dofs();
     let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
     aligned.noise = model.learnt.noise.clone();
     let by_landmarks = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
@@ -144,22 +198,26 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
 
     let design = design(model);
     let mut target = targets.forcing.row(0).to_vec();
+    let mut samples = 0;
     if model.kind() == Kind::Rhythmic {
-        let samples = cycle_phase::phase_lead(&design, &target, model.demonstrated.styles.view(), n_dofs);
+        samples = cycle_phase::phase_lead(&design, &target, model.demonstrated.styles.view(), n_dofs);
         target.rotate_left(samples * n_dofs);
         crate::validate::row_major_mut(&mut position).rotate_left(samples * n_dofs);
     }
     let (style, truncation_error) = maximum_a_posteriori(&design, &target, &model.demonstrated.styles);
-    check_size(&style, model)?;
     let row = |rows: &Array2<f64>| Some(rows.row(0).to_vec());
     let mut conditions = Conditions { style: Some(style.clone()), ..Conditions::default() };
     match model.kind() {
         Kind::Discrete => (conditions.goal, conditions.start) = (row(&targets.goals), row(&targets.starts)),
         Kind::Rhythmic => conditions.anchor = row(&targets.anchors),
     }
-    let off = relative_deviation(model, &conditions, position.view())?;
-    let times = truncation_error / training_truncation_error(model, target.len());
-    if off > MAX_DEVIATION && times > MAX_TRUNCATION_RATIO { Err(Error::Undescribed { off, times }) } else { Ok(style) }
+    let described = check_size(&style, model).and_then(|()| {
+        let off = relative_deviation(model, &conditions, position.view())?;
+        let times = truncation_error / training_truncation_error(model, target.len());
+        let undescribed = off > MAX_DEVIATION && times > MAX_TRUNCATION_RATIO;
+        if undescribed { Err(Error::Undescribed { off, times }) } else { Ok(()) }
+    });
+    Ok(Estimate { style, lead: samples as f64 / model.learnt.n_samples as f64, described })
 }
 
 /// Returns the root mean square truncation error of the demonstrations, in the units of the factorisation.

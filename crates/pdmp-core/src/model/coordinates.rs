@@ -10,6 +10,7 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use crate::demonstration::RotationColumns;
+pub(crate) use crate::demonstration::layout;
 use crate::dynamics::mean_rotation::MeanRotation;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -55,22 +56,6 @@ pub(crate) struct Rotation {
     /// First of its three degrees of freedom.
     pub(crate) dof: usize,
     pub(crate) mean: MeanRotation,
-}
-
-/// Returns the columns and DoFs (column, DoF) of the coordinates that are no part of a rotation, and the first DoF of each
-/// rotation.
-pub(crate) fn layout(n_coordinates: usize, rotations: &[RotationColumns]) -> (Vec<[usize; 2]>, Vec<usize>) {
-    let (mut plain, mut firsts, mut column, mut dof) = (Vec::new(), Vec::new(), 0, 0);
-    while column < n_coordinates {
-        if rotations.iter().any(|rotation| rotation.column == column) {
-            firsts.push(dof);
-            (column, dof) = (column + 4, dof + 3);
-        } else {
-            plain.push([column, dof]);
-            (column, dof) = (column + 1, dof + 1);
-        }
-    }
-    (plain, firsts)
 }
 
 impl Rotation {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::conditions::Conditions;
 use crate::model::coordinates::Coordinates;
 use crate::model::primitive::Primitive;
@@ -62,14 +62,6 @@ impl Primitive {
         match &self.coordinates {
             Some(coordinates) => coordinates.check(name, position),
             None => check_vector(name, position, self.n_dofs(), "DoF"),
-        }
-    }
-
-    /// Refuses a primitive with rotations.
-    pub(crate) fn refuse_rotations(&self, problem: &'static str) -> Result<()> {
-        match self.coordinates {
-            Some(_) => Err(Error::Argument { name: "model", problem }),
-            None => Ok(()),
         }
     }
 

@@ -9,6 +9,7 @@ pub(crate) mod prediction;
 pub(crate) mod primitive;
 pub(crate) mod responses;
 pub(crate) mod sensitivity;
+mod tangent;
 pub(crate) mod template;
 
 use std::ops::Deref;
@@ -28,6 +29,7 @@ pub use prediction::Prediction;
 use primitive::Nominal;
 pub use primitive::Primitive;
 pub use responses::Derivative;
+pub use tangent::{from_tangent, mean_positions, to_tangent};
 pub use template::{TimeWarp, WarpTemplate};
 
 /// Parameters of each demonstration, in absolute coordinates.

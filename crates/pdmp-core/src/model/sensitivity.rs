@@ -12,6 +12,9 @@ use crate::model::responses::Curves;
 /// Number of steps of a movement over which errors are averaged.
 pub(crate) const STEPS: usize = 100;
 
+/// Rows of a linear map of the three DoFs of a rotation.
+pub(crate) type Matrix = [[f64; 3]; 3];
+
 /// Sensitivity of the positions to each output.
 pub(crate) struct Sensitivity<'a> {
     curves: &'a Curves,
@@ -45,12 +48,20 @@ impl<'a> Sensitivity<'a> {
         Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| self.entries(k, d).map(|(i, x)| outputs[i] * x).sum())
     }
 
-    /// Returns the variances (T, D) of the positions for a covariance (P, P) of the outputs.
-    pub(crate) fn variances(&self, covariance: &Array2<f64>) -> Array2<f64> {
+    /// Returns the variances (T, D) of the positions for a covariance (P, P) of the outputs. Those of a rotation are of the
+    /// vectors to which the maps of each sample, with its first DoF, send changes of its three DoFs.
+    pub(crate) fn variances(&self, covariance: &Array2<f64>, maps: &[Vec<(usize, Matrix)>]) -> Array2<f64> {
         Array2::from_shape_fn(self.curves.start.dim(), |(k, d)| {
-            let entries = self.entries(k, d);
-            let row = |i: usize| entries.clone().map(|(j, y)| covariance[[i, j]] * y).sum::<f64>();
-            entries.clone().map(|(i, x)| x * row(i)).sum::<f64>().max(0.0)
+            let map = maps.get(k).and_then(|maps| maps.iter().find(|(dof, _)| (*dof..dof + 3).contains(&d)));
+            let entries: Vec<(usize, f64)> = match map {
+                None => self.entries(k, d).collect(),
+                Some((dof, map)) => {
+                    let row = map[d - dof];
+                    (0..3).flat_map(|j| self.entries(k, dof + j).map(move |(i, x)| (i, row[j] * x))).collect()
+                }
+            };
+            let row = |i: usize| entries.iter().map(|&(j, y)| covariance[[i, j]] * y).sum::<f64>();
+            entries.iter().map(|&(i, x)| x * row(i)).sum::<f64>().max(0.0)
         })
     }
 

@@ -14,9 +14,10 @@
 
 use std::ops::Range;
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 
 use super::clock;
+use super::cycle_rotations::with_matrices;
 use crate::demonstration::Demonstration;
 use crate::error::Result;
 use crate::numerics::smoothing_spline::{Smoothing, smooth};
@@ -31,6 +32,8 @@ pub(super) struct Curve {
     pub(super) splines: Splines,
     /// Residual of the smoothing (T, D), in the unit of each DoF.
     pub(super) noise: Array2<f64>,
+    /// Columns of each rotation.
+    pub(super) rotations: Vec<Range<usize>>,
 }
 
 impl Curve {
@@ -39,11 +42,26 @@ impl Curve {
     /// # Errors
     /// A recording without times.
     pub(super) fn of(demo: &Demonstration) -> Result<Self> {
+        Self::through(demo, demo.position(), demo.quaternion_columns())
+    }
+
+    /// Smooths a recording with the elements of rotation matrices in place of quaternions: they do not depend on signs, and
+    /// repeat themselves with the rotation.
+    ///
+    /// # Errors
+    /// A recording without times.
+    pub(super) fn with_matrices(demo: &Demonstration) -> Result<Self> {
+        let (values, rotations) = with_matrices(demo.position(), demo.rotations());
+        Self::through(demo, values.view(), rotations)
+    }
+
+    fn through(demo: &Demonstration, values: ArrayView2<f64>, rotations: Vec<Range<usize>>) -> Result<Self> {
         let time = clock(demo)?;
-        let smoothed = smooth(Smoothing::Auto, &time, None, demo.position(), &demo.quaternion_columns())?;
-        let values: Vec<f64> = smoothed.iter().copied().collect();
-        let splines = Splines::through(Knots::not_a_knot(time.clone()), &values, demo.n_coordinates());
-        Ok(Self { time, splines, noise: &demo.position() - &smoothed })
+        let smoothed = smooth(Smoothing::Auto, &time, None, values, &rotations)?;
+        let noise = &values - &smoothed;
+        let smoothed: Vec<f64> = smoothed.iter().copied().collect();
+        let splines = Splines::through(Knots::not_a_knot(time.clone()), &smoothed, values.ncols());
+        Ok(Self { time, splines, noise, rotations })
     }
 
     /// Returns the time of the first sample, in seconds.

@@ -1,17 +1,21 @@
 //! Segmentation of cyclic recordings into closed cycles of common phase.
 
-use ndarray::{Array1, Array2, Axis, s};
+use ndarray::{Array1, Array2, s};
 
 use super::cycle_growth::{Growth, exceeds_movement, median_gain, turns};
 use super::cycle_onsets::CycleSearch;
+use super::cycle_rotations::{self, with_matrices};
 use super::outliers::{RejectionReason, rejections};
 use super::periodicity::{period_of, traits};
 use super::resampling::check_times;
-use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, Sampling};
+use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, RotationColumns, Sampling, layout};
 use crate::error::{Error, Result};
 use crate::numerics::statistics::median;
 use crate::preprocessing::Curve;
 use crate::validate::check_length;
+
+/// Gain of a rotation per cycle in rad that is always accepted: rounding.
+const MIN_TURN: f64 = 1e-9;
 
 /// Demonstrations that are made from the cycles of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,9 +111,8 @@ pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: C
     let (mut nominal, mut errors) = (None, Vec::new());
     for (recording, demo) in recordings.iter().enumerate() {
         let mut segment = || {
-            if !demo.rotations().is_empty() {
-                let problem = "has rotations, for which cycles are not found: cut the recording with split_at";
-                return Err(Error::Argument { name: "recording", problem });
+            if demo.rotations() != recordings[0].rotations() {
+                return Err(Error::Argument { name: "rotations", problem: "differ from those of recording 0" });
             }
             if demo.n_coordinates() != n_dofs {
                 return Err(Error::Dofs { expected: n_dofs, found: demo.n_coordinates() });
@@ -117,7 +120,7 @@ pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: C
             let curve = Curve::of(demo)?;
             let bounds = match onsets {
                 Some(onsets) => bounds_at_onsets(&curve, &onsets[recording]),
-                None => find_bounds(&curve, &mut nominal),
+                None => find_bounds(demo, &mut nominal),
             };
             match bounds {
                 Ok((period, bounds)) => cycles.add(recording, demo, &curve, period, &bounds, keep),
@@ -143,8 +146,9 @@ fn bounds_at_onsets(curve: &Curve, onsets: &[f64]) -> Result<(f64, Vec<f64>)> {
 
 /// Returns the period and the bounds of the cycles, in seconds, in phase with the `nominal` mean cycle, which the first
 /// recording defines.
-fn find_bounds(curve: &Curve, nominal: &mut Option<Array2<f64>>) -> Result<(f64, Vec<f64>)> {
-    let traits = traits(curve)?;
+fn find_bounds(demo: &Demonstration, nominal: &mut Option<Array2<f64>>) -> Result<(f64, Vec<f64>)> {
+    let curve = Curve::with_matrices(demo)?;
+    let traits = traits(&curve)?;
     let period = period_of(traits.view(), curve.interval())?;
     let (bounds, mean) = CycleSearch { traits: traits.view(), period }.bounds(nominal.as_ref());
     nominal.get_or_insert(mean);
@@ -156,40 +160,76 @@ fn find_bounds(curve: &Curve, nominal: &mut Option<Array2<f64>>) -> Result<(f64,
 struct ClosedCycles {
     /// Positions (C, D) of each cycle.
     cycles: Vec<Array2<f64>>,
-    /// Gain of each DoF (D,) in each cycle.
+    /// Gain of each DoF in each cycle.
     gains: Vec<Array1<f64>>,
 }
 
 impl ClosedCycles {
     /// Samples and closes the cycles between successive bounds in seconds.
-    fn between(curve: &Curve, bounds: &[f64], n_samples: usize) -> Result<Self> {
+    fn between(curve: &Curve, bounds: &[f64], n_samples: usize, rotations: &[RotationColumns]) -> Result<Self> {
         let (mut cycles, mut gains) = (Vec::new(), Vec::new());
         for pair in bounds.windows(2) {
             let whole = curve.sample(pair[0], pair[1], n_samples + 1)?;
             let ends = curve.smooth(pair[0], pair[1], 2)?;
-            let gain = &ends.row(1) - &ends.row(0);
-            let ramp = Array1::from_shape_fn(n_samples, |c| c as f64 / n_samples as f64 - 0.5).insert_axis(Axis(1));
-            cycles.push(&whole.slice(s![..n_samples, ..]) - &(ramp * &gain));
+            let (plain, dofs) = layout(whole.ncols(), rotations);
+            let mut cycle = whole.slice(s![..n_samples, ..]).to_owned();
+            let mut gain = Array1::zeros(whole.ncols() - rotations.len());
+            for [column, dof] in plain {
+                gain[dof] = ends[[1, column]] - ends[[0, column]];
+                for (c, y) in cycle.column_mut(column).iter_mut().enumerate() {
+                    *y -= (c as f64 / n_samples as f64 - 0.5) * gain[dof];
+                }
+            }
+            for (&columns, dof) in rotations.iter().zip(dofs) {
+                let turned = cycle_rotations::close(&mut cycle.view_mut(), ends.view(), columns);
+                gain.slice_mut(s![dof..dof + 3]).assign(&ndarray::aview1(&turned));
+            }
+            cycles.push(cycle);
             gains.push(gain);
         }
         Ok(Self { cycles, gains })
     }
 
     /// Subtracts whole turns per cycle from all later cycles; returns the DoFs that turn or whose gain exceeds their movement.
-    fn remove_turns(&mut self, recording: usize, units: Option<&[String]>) -> Vec<Growth> {
+    fn remove_turns(
+        &mut self,
+        recording: usize,
+        units: Option<&[String]>,
+        rotations: &[RotationColumns],
+    ) -> Vec<Growth> {
         let mut growths = Vec::new();
-        for dof in 0..self.gains.first().map_or(0, Array1::len) {
+        let (plain, dofs) = layout(self.cycles.first().map_or(0, Array2::ncols), rotations);
+        for [column, dof] in plain {
             let mean = self.gains.iter().map(|gain| gain[dof]).sum::<f64>() / self.gains.len() as f64;
-            let (turns, turn) = turns(mean, units.map_or("", |units| &units[dof]));
+            let (turns, turn) = turns(mean, units.map_or("", |units| &units[column]));
             for (k, cycle) in self.cycles.iter_mut().enumerate().filter(|_| turns != 0) {
-                cycle.column_mut(dof).mapv_inplace(|y| y - (k as f64 * f64::from(turns)) * turn);
+                cycle.column_mut(column).mapv_inplace(|y| y - (k as f64 * f64::from(turns)) * turn);
             }
             let gain = median_gain(&self.gains, dof);
-            if turns != 0 || exceeds_movement(gain, &self.cycles, dof) {
+            if turns != 0 || exceeds_movement(gain, &self.cycles, column) {
                 growths.push(Growth { recording, dof, gain, turns });
             }
         }
+        for (&columns, dof) in rotations.iter().zip(dofs) {
+            let gain = [0, 1, 2].map(|i| median_gain(&self.gains, dof + i));
+            let movement = self.cycles.iter().map(|cycle| cycle_rotations::range(cycle.view(), columns));
+            if cycle_rotations::length(gain) > movement.fold(MIN_TURN, f64::max) {
+                let largest = (0..3).max_by(|&i, &j| gain[i].abs().total_cmp(&gain[j].abs())).unwrap_or(0);
+                growths.push(Growth { recording, dof: dof + largest, gain: gain[largest], turns: 0 });
+            }
+        }
         growths
+    }
+
+    /// Returns the reasons for which cycles are rejected.
+    fn rejections(&self, periods: &[f64], rotations: &[RotationColumns]) -> Vec<Option<RejectionReason>> {
+        if rotations.is_empty() {
+            return rejections(periods, &self.cycles, &[]);
+        }
+        let columns = with_matrices(self.cycles[0].view(), rotations).1;
+        let values: Vec<Array2<f64>> =
+            self.cycles.iter().map(|cycle| with_matrices(cycle.view(), rotations).0).collect();
+        rejections(periods, &values, &columns)
     }
 }
 
@@ -215,11 +255,12 @@ impl Cycles {
             return Ok(());
         }
         let n_samples = (period / curve.interval()).round().max(MIN_SAMPLES_PER_DEMONSTRATION as f64);
-        let mut closed = ClosedCycles::between(curve, bounds, n_samples as usize)?;
-        self.growths.extend(closed.remove_turns(recording, demo.units()));
+        let rotations = demo.rotations();
+        let mut closed = ClosedCycles::between(curve, bounds, n_samples as usize, rotations)?;
+        self.growths.extend(closed.remove_turns(recording, demo.units(), rotations));
         let periods = intervals(bounds);
         let mut kept = Vec::new();
-        for (k, reason) in rejections(&periods, &closed.cycles).into_iter().enumerate() {
+        for (k, reason) in closed.rejections(&periods, rotations).into_iter().enumerate() {
             match reason {
                 Some(reason) => {
                     let (start, period) = (bounds[k], periods[k]);
@@ -230,8 +271,13 @@ impl Cycles {
         }
         if keep == CycleOutput::Mean {
             let n = kept.len() as f64;
+            let own: Vec<Array2<f64>> =
+                if rotations.is_empty() { Vec::new() } else { kept.iter().map(|cycle| cycle.2.clone()).collect() };
             let sum = kept.into_iter().reduce(|a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2));
             kept = sum.into_iter().map(|(period, gain, cycle)| (period / n, gain / n, cycle / n)).collect();
+            for (_, _, mean) in &mut kept {
+                rotations.iter().for_each(|&columns| cycle_rotations::average(&own, columns, mean));
+            }
         }
         for (period, gain, position) in kept {
             let dt = period / position.nrows() as f64;

@@ -12,7 +12,9 @@
 //! | `cycle_onsets` | onset of each cycle |
 //! | `outliers` | cycles that differ from the others |
 //! | `cycle_growth` | gain per cycle, such as that of the angle of a wheel |
+//! | `cycle_rotations` | features, gain and mean of rotations |
 //! | `cycles` | one closed demonstration per cycle, in phase across recordings |
+//! | `orientation` | conversions to and from unit quaternions |
 //! | `inspection` | detection of implausible samples |
 //!
 //! Results keep the names, units and context of a recording, and its goal if the movement ends where the recording does.
@@ -20,10 +22,12 @@
 mod curve;
 mod cycle_growth;
 mod cycle_onsets;
+mod cycle_rotations;
 mod cycles;
 mod gaps;
 pub mod inspection;
 mod lowpass;
+pub mod orientation;
 mod outliers;
 mod periodicity;
 mod resampling;

@@ -7,8 +7,9 @@
 //! of 3.5).
 
 use std::fmt;
+use std::ops::Range;
 
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, Axis, s};
 
 use super::periodicity::NO_CYCLES;
 use crate::error::Error;
@@ -84,11 +85,15 @@ impl fmt::Display for RejectionReason {
 }
 
 /// Returns for each cycle of a recording the reason of its rejection, if any, from the periods in seconds and the closed
-/// positions (C, D).
-pub(super) fn rejections(periods: &[f64], cycles: &[Array2<f64>]) -> Vec<Option<RejectionReason>> {
+/// positions (C, D) with the columns of each rotation.
+pub(super) fn rejections(
+    periods: &[f64],
+    cycles: &[Array2<f64>],
+    rotations: &[Range<usize>],
+) -> Vec<Option<RejectionReason>> {
     let median_period = median(periods);
     let period_limit = f64::max(MAX_SCORE * deviation(periods, median_period), PERIOD_TOLERANCE * median_period);
-    let distances = distances(cycles);
+    let distances = distances(cycles, rotations);
     let median_distance = median(&distances);
     let distance_limit = (median_distance + MAX_SCORE * deviation(&distances, median_distance))
         .max(DISTANCE_TOLERANCE * median_distance)
@@ -102,15 +107,21 @@ pub(super) fn rejections(periods: &[f64], cycles: &[Array2<f64>]) -> Vec<Option<
     periods.iter().zip(&distances).map(rejection).collect()
 }
 
-/// Returns the root mean square distance of each cycle from the median cycle, each DoF relative to its standard deviation.
-fn distances(cycles: &[Array2<f64>]) -> Vec<f64> {
+/// Returns the root mean square distance of each cycle from the median cycle, each DoF relative to its standard deviation,
+/// the columns of a rotation relative to that of all of them.
+fn distances(cycles: &[Array2<f64>], rotations: &[Range<usize>]) -> Vec<f64> {
     let Some(first) = cycles.first() else { return Vec::new() };
     let centred = |cycle: &Array2<f64>| cycle - &cycle.mean_axis(Axis(0)).unwrap_or_default();
     let cycles: Vec<Array2<f64>> = cycles.iter().map(centred).collect();
     let median_cycle = Array2::from_shape_fn(first.dim(), |index| {
         median(&cycles.iter().map(|cycle| cycle[index]).collect::<Vec<_>>())
     });
-    let deviations = median_cycle.std_axis(Axis(0), 0.0);
+    let mut deviations = median_cycle.std_axis(Axis(0), 0.0);
+    for columns in rotations {
+        let mut own = deviations.slice_mut(s![columns.clone()]);
+        let common = own.iter().map(|x| x * x).sum::<f64>() / own.len() as f64;
+        own.fill(common.sqrt());
+    }
     let distance = |cycle: &Array2<f64>| {
         let differences = (cycle - &median_cycle) / &deviations;
         // The quotient is not finite for a DoF at rest, which is left out.

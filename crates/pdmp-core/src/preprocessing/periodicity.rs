@@ -1,7 +1,7 @@
 //! Autocorrelation of a recording, and its period.
 //!
 //! The traits of a recording are the positions and velocities of all DoFs, detrended linearly and scaled to unit standard
-//! deviation, which removes drift and units. Velocities distinguish cycles from slow wander, and positions distinguish cycles
+//! deviation, which removes drift and units; a rotation has the elements of its matrix, with a common scale. Velocities distinguish cycles from slow wander, and positions distinguish cycles
 //! from their harmonics. The autocorrelation of trait f of n samples at lag k is Pearson's correlation of the overlapping
 //! parts,
 //!
@@ -30,7 +30,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use faer::c64;
-use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, concatenate};
+use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, Axis, concatenate};
 
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
@@ -51,6 +51,8 @@ const LOBE_THRESHOLD: f64 = 0.25;
 const MIN_RELATIVE_HEIGHT: f64 = 0.8;
 /// Largest median mismatch at the period, relative to that at the highest peak.
 const MAX_RELATIVE_MISMATCH: f64 = 2.0;
+/// Least standard deviation of an element of a rotation matrix, relative to that of all elements together.
+const MIN_SHARE: f64 = 0.05;
 /// Median mismatch due to sampling, in addition.
 const SAMPLING_MISMATCH: f64 = 0.005;
 
@@ -72,7 +74,7 @@ const SAMPLING_MISMATCH: f64 = 0.005;
 /// # Errors
 /// A recording that does not repeat itself, stands still, or has no times.
 pub fn period(demo: &Demonstration) -> Result<f64> {
-    let curve = Curve::of(demo)?;
+    let curve = Curve::with_matrices(demo)?;
     Ok(period_of(traits(&curve)?.view(), curve.interval())? * curve.interval())
 }
 
@@ -88,15 +90,14 @@ pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
     let mut position = curve.sample(first, last, n)?;
     // At a high sampling rate noise dominates unsmoothed velocities.
     let mut smoothed = curve.smooth(first, last, n)?;
-    let both = position.columns_mut().into_iter().zip(smoothed.columns_mut());
-    let weights: Vec<f64> = both
-        .map(|(position, smoothed)| [standardise(position), standardise(smoothed)])
-        .map(|[total, preserved]| if total > 0.0 { (preserved / total).min(1.0) } else { 0.0 })
-        .collect();
+    let [total, preserved] =
+        [&mut position, &mut smoothed].map(|values| standardise_all(values.view_mut(), &curve.rotations));
+    let weight = |(&total, preserved): (&f64, f64)| if total > 0.0 { (preserved / total).min(1.0) } else { 0.0 };
+    let weights: Vec<f64> = total.iter().zip(preserved).map(weight).collect();
     let smoothed: Vec<f64> = smoothed.iter().copied().collect();
     let mut velocity = Splines::through(Knots::not_a_knot(time), &smoothed, position.ncols()).slopes();
+    standardise_all(velocity.view_mut(), &curve.rotations);
     for (mut column, weight) in velocity.columns_mut().into_iter().zip(weights) {
-        standardise(column.view_mut());
         column *= weight;
     }
     let traits = concatenate![Axis(1), position, velocity];
@@ -104,6 +105,22 @@ pub(super) fn traits(curve: &Curve) -> Result<Array2<f64>> {
         return Err(Error::Still { consequence: NO_CYCLES });
     }
     Ok(traits)
+}
+
+/// Standardises each column, and returns the deviations before scaling. The columns of a rotation have one scale, by which
+/// their variances add up to three, that of three degrees of freedom; those that vary little are noise and become zero.
+fn standardise_all(mut values: ArrayViewMut2<f64>, rotations: &[Range<usize>]) -> Vec<f64> {
+    let mut deviations: Vec<f64> = values.columns_mut().into_iter().map(standardise).collect();
+    for columns in rotations {
+        let own = deviations[columns.clone()].to_vec();
+        let common = (own.iter().map(|x| x * x).sum::<f64>() / 3.0).sqrt();
+        for (column, deviation) in columns.clone().zip(own) {
+            let scale = if deviation > MIN_SHARE * common { deviation / common } else { 0.0 };
+            values.column_mut(column).mapv_inplace(|y| y * scale);
+            deviations[column] = common;
+        }
+    }
+    deviations
 }
 
 /// Subtracts the linear trend by least squares, and scales to unit standard deviation. Returns the deviation before scaling.
