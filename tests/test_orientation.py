@@ -111,7 +111,7 @@ def test_axes_and_angles_are_rotation_vectors(v: Array, turn: float, order: Any,
 def test_euler_angles_are_products_of_elementary_rotations(
     angles: Any, sequence: str, order: Any, unit: Any
 ) -> None:
-    """All sequences, about fixed and moving axes, are products of matrices, and come back."""
+    """Sequences, about fixed and moving axes, are products of matrices, and come back."""
     given_angles = np.array(angles) / UNIT[unit]
     q = pre.euler_to_quaternions(given_angles, sequence, unit=unit, order=order)
     matrix = of_euler(angles, sequence)

@@ -375,7 +375,7 @@ def test_evaluation_separates_metres_and_angles() -> None:
 
 
 def test_baselines_predict_unit_quaternions() -> None:
-    """All baselines learn rotations, and a linear map predicts those of linear demonstrations."""
+    """Baselines learn rotations, and a linear map predicts those of linear demonstrations."""
     evaluation = pdmp.evaluate(noisy_screws(10, 4), max_folds=3)
     assert not evaluation.skipped
     for made in evaluation.forecasts.values():

@@ -301,7 +301,7 @@ impl Caller<'_> {
         let motion = pdmp_motion { position, velocity, acceleration };
         // SAFETY: every pointer is valid over its stated length, or NULL.
         let status = unsafe {
-            if input.byte() % 2 == 0 {
+            if input.byte().is_multiple_of(2) {
                 pdmp_controller_forecast(self.handle(slot), dt, n_samples, Some(&motion))
             } else {
                 let conditions = Conditions::of(&self.info, input);

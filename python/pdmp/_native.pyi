@@ -52,21 +52,33 @@ __all__ = [
     "Trajectory",
     "__version__",
     "absolute_relative",
+    "axis_angles_to_quaternions",
     "blend",
     "context_rows",
     "cycles",
+    "euler_to_quaternions",
     "factorise",
     "fill_gaps",
     "fit",
+    "from_tangent",
     "inspected",
     "left_right",
     "load",
     "lowpass",
+    "matrices_to_quaternions",
     "mean_pose",
+    "mean_positions",
     "period",
+    "poses_to_transforms",
+    "quaternions_to_euler",
+    "quaternions_to_matrices",
+    "quaternions_to_rotation_vectors",
     "resample",
     "residuals",
+    "rotation_vectors_to_quaternions",
     "split_at",
+    "to_tangent",
+    "transforms_to_poses",
     "trim",
     "turn_of",
 ]
@@ -3103,3 +3115,28 @@ def mean_pose(poses: ArrayLike) -> _Array:  # (..., 7)
         No pose, a number that is not finite, a quaternion whose norm deviates from 1 by more than 1e-3, or a rotation of more
         than 90 degrees from the mean.
     """
+
+_AngleUnit: TypeAlias = Literal["rad", "deg"]
+
+def matrices_to_quaternions(matrices: ArrayLike, *, order: _Order) -> _Array: ...
+def quaternions_to_matrices(quaternions: ArrayLike, *, order: _Order) -> _Array: ...
+def rotation_vectors_to_quaternions(vectors: ArrayLike, *, order: _Order) -> _Array: ...
+def quaternions_to_rotation_vectors(quaternions: ArrayLike, *, order: _Order) -> _Array: ...
+def axis_angles_to_quaternions(
+    axes: ArrayLike, angles: ArrayLike, *, unit: _AngleUnit, order: _Order
+) -> _Array: ...
+def euler_to_quaternions(
+    angles: ArrayLike, sequence: str, *, unit: _AngleUnit, order: _Order
+) -> _Array: ...
+def quaternions_to_euler(
+    quaternions: ArrayLike, sequence: str, *, unit: _AngleUnit, order: _Order
+) -> _Array: ...
+def transforms_to_poses(transforms: ArrayLike, *, order: _Order) -> _Array: ...
+def poses_to_transforms(poses: ArrayLike, *, order: _Order) -> _Array: ...
+def to_tangent(
+    reference: ArrayLike, position: ArrayLike, rotations: Mapping[int, _Order]
+) -> _Array: ...
+def from_tangent(
+    reference: ArrayLike, dofs: ArrayLike, rotations: Mapping[int, _Order]
+) -> _Array: ...
+def mean_positions(positions: Sequence[ArrayLike], rotations: Mapping[int, _Order]) -> _Array: ...

@@ -9,29 +9,26 @@ example: pdmp explore reach.safetensors recordings/ -o reach.html
 from argparse import ArgumentParser, Namespace
 
 import pdmp
-from pdmp.cli.console import say
+from pdmp.cli.formats import FORMATS
 from pdmp.cli.options import (
     add_model,
     add_output,
     add_reader_options,
-    check_file,
+    add_recordings,
     file_path,
     reader_arguments,
 )
+from pdmp.cli.streams import inputs, output, summarise
 from pdmp.io import read
+
+EPILOG = FORMATS
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
     add_model(parser)
-    parser.add_argument(
-        "paths",
-        nargs="*",
-        type=file_path,
-        metavar="PATH",
-        help="its demonstrations, as for pdmp fit",
-    )
-    add_output(parser, "FILE", "HTML file to write", required=True)
+    add_recordings(parser, "*")
+    add_output(parser, "FILE", "HTML file to write; - is standard output", stream=True, required=True)
     parser.add_argument(
         "--dofs", nargs="+", metavar="NAME", help="degrees of freedom with diagrams at first"
     )
@@ -48,15 +45,16 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Loads a model and writes its page."""
-    check_file(options.output)
-    model = pdmp.load(options.model)
-    limits = None if options.urdf is None else pdmp.Limits.from_urdf(options.urdf, model.names)
-    recordings = read(options.paths, **reader_arguments(options)) if options.paths else None
-    page = model.explorer(
-        options.output,
-        demonstrations=recordings,
-        limits=limits,
-        dofs=options.dofs,
-        title=options.title,
-    )
-    say(f"{options.output}: {len(page.html.encode()) // 1000} kB")
+    with output(options.output) as path:
+        with inputs([options.model, *options.paths]) as (model_path, *paths):
+            model = pdmp.load(model_path)
+            recordings = read(paths, **reader_arguments(options)) if paths else None
+        limits = None if options.urdf is None else pdmp.Limits.from_urdf(options.urdf, model.names)
+        page = model.explorer(
+            path,
+            demonstrations=recordings,
+            limits=limits,
+            dofs=options.dofs,
+            title=options.title,
+        )
+    summarise(options.output, f"{len(page.html.encode()) // 1000} kB")
