@@ -16,7 +16,9 @@ MAX_WAIT = 60.0  # s, for one answer
 
 
 def executable() -> str | None:
-    """Returns the path of a Chromium, or None."""
+    """Returns the path of a Chromium, or None where none can be driven over descriptors."""
+    if os.name != "posix":
+        return None
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 

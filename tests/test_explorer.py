@@ -75,21 +75,33 @@ def turning_cycles() -> pdmp.Model:
     return pdmp.fit(demos, kind="rhythmic", n_styles=2)
 
 
+def warped() -> pdmp.Model:
+    """Returns a model with several segments of time."""
+    demos = [pdmp.Demonstration(demo.position, dt=0.02) for demo in reaches()]
+    return pdmp.fit(demos, alignment="warp")
+
+
 MODELS: dict[str, Callable[[], pdmp.Model]] = {
     "discrete": lambda: pdmp.fit(reaches(), n_styles=2),
     "immediate": lambda: pdmp.fit(reaches(), n_styles=2, transport="immediate"),
     "rhythmic": lambda: pdmp.fit(loops(), kind="rhythmic", n_styles=2),
     "one style": lambda: pdmp.fit(reaches(), n_styles=1),
     "own tau": lambda: pdmp.fit(reaches(), tau=0.5),
+    "warped": warped,
     "poses": lambda: poses("wxyz", "body"),
     "poses in the world": lambda: poses("xyzw", "world"),
     "turning cycles": turning_cycles,
 }
 
+TURNING = {"poses", "poses in the world", "turning cycles"}
+"""Models with rotations, whose positions are no sums of curves."""
+
 # ---------------------------------------------------------------- without a browser
 
 
-@pytest.mark.parametrize("name", ["discrete", "immediate", "rhythmic", "one style", "own tau"])
+@pytest.mark.parametrize(
+    "name", ["discrete", "immediate", "rhythmic", "one style", "own tau", "warped"]
+)
 def test_curves_in_the_page_add_up_to_rollouts(name: str) -> None:
     """For drawn conditions, sums of the curves equal position, velocity and acceleration."""
     model = MODELS[name]()
@@ -160,6 +172,17 @@ def test_contexts_with_too_many_combinations_are_omitted_with_a_note() -> None:
     data = data_of(model.explorer().html)
     assert data["contexts"] is None
     assert any("Contexts of 9 columns" in note for note in data["notes"])
+
+
+def test_pages_of_warped_models_state_that_time_is_linear() -> None:
+    """Segments of time are no conditions of the page, which says so."""
+    model = warped()
+    n_segments = model.segment_durations.shape[1]
+    assert n_segments > 1
+    [note] = data_of(model.explorer().html)["notes"]
+    assert note.startswith(
+        f"The model has {n_segments} time segments. This page shows movements in "
+    )
 
 
 def test_the_page_stands_alone() -> None:
@@ -324,6 +347,34 @@ def test_the_command_writes_the_page(
     page = Path(out).read_text(encoding="utf-8")
     assert page == reach.explorer(dofs=["y"], title="Reaches").html
     assert re.fullmatch(r".*reach\.html: \d+ kB\n", capsys.readouterr().out)
+
+
+def test_the_command_draws_recordings_and_limits_of_a_robot(
+    reach: pdmp.Model, tmp_path: Path
+) -> None:
+    """Recordings and the joint limits of a URDF file are in the page."""
+    links = "".join(f'<link name="{name}"/>' for name in "abc")
+    joints = "".join(
+        f'<joint name="{name}" type="prismatic"><parent link="{parent}"/><child link="{child}"/>'
+        f'<limit lower="-1" upper="{upper}" velocity="2" effort="1"/></joint>'
+        for name, parent, child, upper in [("x", "a", "b", 1.5), ("y", "b", "c", 0.5)]
+    )
+    (tmp_path / "robot.urdf").write_text(f'<robot name="r">{links}{joints}</robot>')
+    reach.save(tmp_path / "reach.safetensors")
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    for k, demo in enumerate(reaches()):
+        rows = np.column_stack([0.02 * np.arange(demo.n_samples), demo.position])
+        header = "t,x [m],y [m]"
+        np.savetxt(folder / f"{k}.csv", rows, delimiter=",", header=header, comments="")
+    out = tmp_path / "reach.html"
+    files = [str(tmp_path / "reach.safetensors"), *sorted(map(str, folder.iterdir()))]
+    assert main(["explore", *files, "--urdf", str(tmp_path / "robot.urdf"), "-o", str(out)]) == 0
+    data = data_of(out.read_text(encoding="utf-8"))
+    assert data["limits"]["upper"] == [1.5, 0.5] and data["limits"]["velocity"] == [2, 2]
+    assert len(data["recordings"]) == 5
+    drawn = np.frombuffer(base64.b64decode(data["recordings"][1]["position"]["f32"]), "<f4")
+    np.testing.assert_array_equal(drawn.reshape(-1, 2)[-1], np.float32(reaches()[1].position[-1]))
 
 
 # ---------------------------------------------------------------- in a browser
