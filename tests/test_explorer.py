@@ -93,6 +93,9 @@ MODELS: dict[str, Callable[[], pdmp.Model]] = {
     "turning cycles": turning_cycles,
 }
 
+TURNING = {"poses", "poses in the world", "turning cycles"}
+"""Models with rotations, whose positions are no sums of curves."""
+
 # ---------------------------------------------------------------- without a browser
 
 
@@ -361,7 +364,9 @@ def test_the_command_draws_recordings_and_limits_of_a_robot(
     folder = tmp_path / "recordings"
     folder.mkdir()
     for k, demo in enumerate(reaches()):
-        pdmp.io.write_csv(folder / f"{k}.csv", demo)
+        rows = np.column_stack([0.02 * np.arange(demo.n_samples), demo.position])
+        header = "t,x [m],y [m]"
+        np.savetxt(folder / f"{k}.csv", rows, delimiter=",", header=header, comments="")
     out = tmp_path / "reach.html"
     files = [str(tmp_path / "reach.safetensors"), *sorted(map(str, folder.iterdir()))]
     assert main(["explore", *files, "--urdf", str(tmp_path / "robot.urdf"), "-o", str(out)]) == 0

@@ -28,7 +28,9 @@ def arguments(parser: ArgumentParser) -> None:
     """Declares the arguments of the command."""
     add_model(parser)
     add_recordings(parser, "*")
-    add_output(parser, "FILE", "HTML file to write; - is standard output", stream=True, required=True)
+    add_output(
+        parser, "FILE", "HTML file to write; - is standard output", stream=True, required=True
+    )
     parser.add_argument(
         "--dofs", nargs="+", metavar="NAME", help="degrees of freedom with diagrams at first"
     )
