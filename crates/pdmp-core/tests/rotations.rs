@@ -15,12 +15,12 @@ use pdmp_core::learning::{StyleOptions, Truncation, style_of};
 use pdmp_core::model::{Derivative, Finding, Frame};
 use pdmp_core::motion::{
     BatchConditions, Coupling, Limits, Trajectory, WithRespectTo, batch, fastest_tau, feasible, jacobian,
-    nearest_feasible, prediction_band,
+    prediction_band,
 };
 use pdmp_core::numerics::Threads;
 use pdmp_core::{
-    Command, Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Motion, Result, RotationError,
-    Sampling, Status, fit, rollout,
+    Command, Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Motion, RotationError, Sampling,
+    Status, fit, rollout,
 };
 use poses::*;
 use random::Random;
