@@ -117,7 +117,7 @@ class Recordings:
 
     @cached_property
     def mean(self) -> Array:
-        """Mean of the movements (C, D), about which degrees of freedom describe rotations."""
+        """Returns the mean of the movements (C, D), to which rotations are relative."""
         if not self.rotations:
             return np.asarray(self.sampled.mean(axis=0))
         return mean_positions(list(self.sampled), self.rotations)

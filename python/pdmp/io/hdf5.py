@@ -23,7 +23,7 @@ from pdmp.io._packages import ContentError, load, reading
 MAX_DEFLATION = 1100
 """Largest ratio of the sizes of a data set before and after compression; deflate reaches 1032."""
 POSE = ("obs/robot0_eef_pos", "obs/robot0_eef_quat")
-"""Pose of the end effector of the first robot, in files of robosuite."""
+"""Pose of the end effector of the first robot, as robomimic names it."""
 
 
 def read_hdf5(
@@ -40,14 +40,14 @@ def read_hdf5(
     Such a file has a group per demonstration in the group `data`, with data sets (T, n). The
     elements of a data set are named by its last name and their number, as in
     `robot0_joint_pos.3`; of one that ends in `_pos` and has three, `.x`, `.y` and `.z` [m]. Data
-    sets of four whose names end in `_quat` are rotations (x, y, z, w), as robosuite writes them.
+    sets of four whose names end in `_quat` are rotations (x, y, z, w), as robomimic has them.
 
     Parameters
     ----------
     path : path
         An HDF5 file.
     features : str or sequence of str
-        Data sets with the positions; by default the pose of the end effector of robosuite.
+        Data sets with the positions; by default the pose of the end effector.
     columns : sequence of str, optional
         Names of the degrees of freedom to keep, in this order; all by default.
     dt : float, optional

@@ -76,6 +76,20 @@ pub fn from_tangent(
 
 /// Returns the mean (T, n_q) of positions: the Karcher mean of each rotation, and the mean of the other coordinates.
 ///
+/// ```
+/// use pdmp_core::demonstration::{QuaternionOrder, RotationColumns};
+/// use pdmp_core::model::mean_positions;
+///
+/// # fn main() -> pdmp_core::Result<()> {
+/// // Turns by ±1 rad about z, beside a coordinate.
+/// let turns = [-0.5f64, 0.5].map(|half| ndarray::array![[half, half.cos(), 0.0, 0.0, half.sin()]]);
+/// let rotations = [RotationColumns { column: 1, order: QuaternionOrder::Wxyz }];
+/// let mean = mean_positions(&[turns[0].view(), turns[1].view()], &rotations)?;
+/// assert!((mean - ndarray::array![[0.0, 1.0, 0.0, 0.0, 0.0]]).iter().all(|x| x.abs() < 1e-15));
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// No positions, or as for [`to_tangent`].
 pub fn mean_positions(positions: &[ArrayView2<f64>], rotations: &[RotationColumns]) -> Result<Array2<f64>> {

@@ -3,7 +3,7 @@
 use crate::error::{Error, LimitError, Result};
 use crate::model::Primitive;
 use crate::motion::angular::AngularLimits;
-use crate::motion::time_law::{PathLimits, RateLimits};
+use crate::motion::rate_limits::{PathLimits, RateLimits};
 use crate::numerics::simd::{F64x4, WIDTH, groups};
 use crate::validate::MAX_MAGNITUDE;
 

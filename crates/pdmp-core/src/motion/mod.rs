@@ -11,6 +11,7 @@ pub(crate) mod jacobian;
 pub(crate) mod limits;
 pub(crate) mod perturbation;
 pub(crate) mod prediction_band;
+pub(crate) mod rate_limits;
 pub(crate) mod rollout;
 pub(crate) mod sampled_path;
 pub(crate) mod stopping;

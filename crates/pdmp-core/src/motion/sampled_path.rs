@@ -1,7 +1,7 @@
 //! Path of a movement, sampled at knots of the clock.
 
 use crate::motion::angular::AngularLimits;
-use crate::motion::time_law::{PathLimits, RateLimits};
+use crate::motion::rate_limits::{PathLimits, RateLimits};
 use crate::numerics::rotation::{Vector, add_scaled};
 use crate::numerics::simd::{F64x4, Register};
 use crate::numerics::state::clone_in_place;

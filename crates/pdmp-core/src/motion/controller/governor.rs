@@ -13,7 +13,7 @@ use super::step::first_element;
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::motion::angular::AngularLimits;
-use crate::motion::time_law::{PathLimits, RateLimits};
+use crate::motion::rate_limits::{PathLimits, RateLimits};
 use crate::numerics::state::{Visitor, clone_in_place, visit_flag, visit_number};
 
 /// Margins of velocity and acceleration along the path.

@@ -21,6 +21,7 @@ mod jerk;
 mod limiter;
 mod limiting;
 mod path_ahead;
+mod path_sampling;
 mod phase;
 mod pose;
 mod setters;

@@ -51,6 +51,18 @@ pub fn matrices_to_quaternions(matrices: ArrayView3<f64>, order: QuaternionOrder
 
 /// Converts unit quaternions (T, 4) to rotation matrices (T, 3, 3).
 ///
+/// ```
+/// use pdmp_core::demonstration::QuaternionOrder;
+/// use pdmp_core::preprocessing::orientation::quaternions_to_matrices;
+///
+/// # fn main() -> pdmp_core::Result<()> {
+/// // Half a turn about x.
+/// let matrices = quaternions_to_matrices(ndarray::array![[0.0, 1.0, 0.0, 0.0]].view(), QuaternionOrder::Wxyz)?;
+/// assert_eq!(matrices, ndarray::array![[[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]]);
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// Rows that are no quaternion, a number that is not finite, or a norm that deviates from 1 by more than 1e-3.
 pub fn quaternions_to_matrices(quaternions: ArrayView2<f64>, order: QuaternionOrder) -> Result<Array3<f64>> {
@@ -64,6 +76,18 @@ pub fn quaternions_to_matrices(quaternions: ArrayView2<f64>, order: QuaternionOr
 
 /// Converts homogeneous transforms (T, 4, 4) from the body frame to the world frame to poses (T, 7) of position x, y, z and
 /// unit quaternion.
+///
+/// ```
+/// use pdmp_core::demonstration::QuaternionOrder;
+/// use pdmp_core::preprocessing::orientation::{poses_to_transforms, transforms_to_poses};
+///
+/// # fn main() -> pdmp_core::Result<()> {
+/// let poses = ndarray::array![[0.4, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0]];
+/// let transforms = poses_to_transforms(poses.view(), QuaternionOrder::Wxyz)?;
+/// assert_eq!(transforms_to_poses(transforms.view(), QuaternionOrder::Wxyz)?, poses);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// As for [`matrices_to_quaternions`], or a last row other than 0, 0, 0, 1.
@@ -84,6 +108,18 @@ pub fn transforms_to_poses(transforms: ArrayView3<f64>, order: QuaternionOrder) 
 }
 
 /// Converts poses (T, 7) of position x, y, z and unit quaternion to homogeneous transforms (T, 4, 4).
+///
+/// ```
+/// use pdmp_core::demonstration::QuaternionOrder;
+/// use pdmp_core::preprocessing::orientation::poses_to_transforms;
+///
+/// # fn main() -> pdmp_core::Result<()> {
+/// let pose = ndarray::array![[0.4, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0]];
+/// let transforms = poses_to_transforms(pose.view(), QuaternionOrder::Wxyz)?;
+/// assert_eq!(transforms.slice(ndarray::s![0, .., 3]), ndarray::array![0.4, 0.0, 0.3, 1.0]);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// As for [`quaternions_to_matrices`].

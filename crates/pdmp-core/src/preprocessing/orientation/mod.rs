@@ -64,6 +64,18 @@ pub fn quaternions_to_rotation_vectors(quaternions: ArrayView2<f64>, order: Quat
 
 /// Converts axes (T, 3) of any length and angles (T,) in rad to unit quaternions (T, 4).
 ///
+/// ```
+/// use pdmp_core::demonstration::QuaternionOrder;
+/// use pdmp_core::preprocessing::orientation::axis_angles_to_quaternions;
+///
+/// # fn main() -> pdmp_core::Result<()> {
+/// let axes = ndarray::array![[0.0, 0.0, 2.0]];
+/// let quaternions = axis_angles_to_quaternions(axes.view(), &[std::f64::consts::FRAC_PI_2], QuaternionOrder::Wxyz)?;
+/// assert!((quaternions[[0, 3]] - 0.5f64.sqrt()).abs() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// Rows that are no vector, a number that is not finite, an axis of norm below 1e-9 with an angle other than 0.
 pub fn axis_angles_to_quaternions(
