@@ -144,8 +144,6 @@ def test_commands_in_the_wrong_shape_are_refused(model: pdmp.Model) -> None:
         model.rollout(velocity=np.zeros(7))
     with pytest.raises(ValueError, match="Jacobians of angular velocities"):
         model.jacobian("style", derivative=1)
-    with pytest.raises(ValueError, match="time_scaling must be linear"):
-        pdmp.fit(demonstrations(), alignment="warp")
 
 
 def test_limits_bound_the_size_of_angular_velocity_and_acceleration(model: pdmp.Model) -> None:
@@ -483,3 +481,94 @@ def test_styles_of_new_cycles_do_not_depend_on_their_phase(turns: int) -> None:
     other = wobble(0.35, turns=turns + 1, n=n)
     with pytest.raises(ValueError, match="degrees from the mean|does not describe"):
         model.style_of(other)
+
+
+def share_of(tempo: float, n: int = 151) -> NDArray[np.float64]:
+    """Returns the share of the movement at equal shares of time, early or late by the tempo."""
+    t = np.linspace(0, 1, n)
+    return t + tempo * np.sin(np.pi * t) ** 2 * np.sin(2 * np.pi * t) / np.pi
+
+
+def turned(
+    swing: float, tempo: float, tool: NDArray[np.float64] | None = None
+) -> pdmp.Demonstration:
+    """Returns a pose that turns, swings and wobbles at an uneven tempo."""
+    u = share_of(tempo)
+    m, bump = u**3 * (10 - 15 * u + 6 * u**2), np.sin(np.pi * u) ** 2
+    q = times(turn([0.6, 0.0, 0.8], 3.5 * m), turn([0.0, 1.0, 0.0], swing * bump))
+    q = times(q, turn([1.0, 0.0, 0.0], 0.5 * np.sin(4 * np.pi * u) * bump))
+    if tool is not None:
+        q = times(q, np.tile(tool, (len(q), 1)))
+    poses = np.column_stack([0.3 * m, 0.2 * bump, 0.1 * m, q])
+    return pdmp.Demonstration(poses, dt=0.01, rotations={3: "wxyz"})
+
+
+TEMPOS = (0.3, -0.3, 0.2, -0.2, 0.0, 0.25, -0.1)
+SWINGS = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
+
+
+def misfit(model: pdmp.Model, demos: list[pdmp.Demonstration]) -> float:
+    """Returns the root mean square angle between demonstrations and their reproductions."""
+    off = []
+    for m, demo in enumerate(demos):
+        made = model.rollout(model.conditions(m), dt=0.01).position
+        n = min(len(made), demo.n_samples)
+        off.append(angles(made[:n, 3:], demo.position[:n, 3:]))
+    return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+
+
+def test_time_warps_align_rotations() -> None:
+    """A warp reproduces the tempo of demonstrations of one shape by one style, linear time not."""
+    demos = [turned(0.0, tempo) for tempo in TEMPOS]
+    linear = pdmp.fit(demos, n_styles=1)
+    warped = pdmp.fit(demos, n_styles=1, alignment=pdmp.TimeWarp(20))
+    assert misfit(linear, demos) > 0.1 and misfit(warped, demos) < 0.015
+    trajectory = warped.rollout(warped.conditions(0), dt=1e-3)
+    q = trajectory.position[:, 3:]
+    step = times(q[:-2] * [1, -1, -1, -1], q[2:])
+    np.testing.assert_allclose(step[:, 1:] / 1e-3, trajectory.velocity[1:-1, 3:], atol=0.05)
+
+
+def test_time_warps_do_not_depend_on_the_tool_frame() -> None:
+    """Demonstrations of another tool frame have the same warp and the same movement."""
+    tool = turn(np.array([0.36, 0.48, 0.8]), np.array(1.1))
+    models = [
+        pdmp.fit(
+            [turned(swing, tempo, frame) for swing, tempo in zip(SWINGS, TEMPOS, strict=True)],
+            alignment=pdmp.TimeWarp(12),
+        )
+        for frame in (None, tool)
+    ]
+    first, second = (model.segment_durations for model in models)
+    np.testing.assert_allclose(first, second, atol=1e-12)
+    own, other = (model.rollout(model.conditions(1)).position[:, 3:] for model in models)
+    assert angles(times(own, np.tile(tool, (len(own), 1))), other).max() < 1e-10
+
+
+@pytest.mark.parametrize("by", ["warp", "landmarks"])
+def test_styles_of_warped_rotations_are_found_again(by: str) -> None:
+    """The style of a demonstration given as a new one is its own, in the time of the model."""
+    demos = [turned(swing, tempo) for swing, tempo in zip(SWINGS, TEMPOS, strict=True)]
+    events = [0.2, 0.35, 0.5, 0.65, 0.8]
+    landmarks = [
+        np.interp(events, share_of(tempo), 1.5 * np.linspace(0, 1, 151)) for tempo in TEMPOS
+    ]
+    timed: dict[str, Any] = {"landmarks": landmarks}
+    if by == "warp":
+        timed = {"alignment": pdmp.TimeWarp(20)}
+    alike = [turned(0.0, tempo) for tempo in TEMPOS]
+    linear = pdmp.fit(alike, n_styles=1)
+    assert misfit(pdmp.fit(alike, n_styles=1, **timed), alike) < 0.25 * misfit(linear, alike)
+    assert misfit(pdmp.fit(demos, n_styles=7, **timed), demos) < 1e-4
+    model = pdmp.fit(demos, n_styles=3, **timed, contexts=[[swing] for swing in SWINGS])
+    for m, demo in enumerate(demos):
+        given = {"landmarks": landmarks[m]} if by == "landmarks" else {}
+        style = model.style_of(demo, **given)  # type: ignore[arg-type]
+        np.testing.assert_allclose(style, model.styles[m], atol=0.02)
+    if by == "landmarks":
+        with pytest.raises(ValueError, match="landmarks is missing"):
+            model.style_of(demos[0])
+        lower, upper = model.band([0.15])
+        assert lower.shape[1] == 6 and (upper >= lower).all()
+        width = (upper - lower)[:, 3:].max(axis=1)
+        assert width[len(width) // 2] > 3 * width[0]

@@ -595,8 +595,12 @@ fn suspicious_rotations_are_reported_or_refused() {
 
     let mixed = [pose(recorded[0].clone()), plain[1].clone()];
     assert!(fit(&mixed, &FitOptions::discrete()).unwrap_err().to_string().contains("rotations"));
-    let warped = FitOptions::discrete().time_scaling(pdmp_core::learning::TimeScaling::WarpIfBetter);
-    assert!(fit(&demonstrations(&recorded), &warped).unwrap_err().to_string().contains("time_scaling"));
+}
+
+/// A band has the degrees of freedom as columns; those of a rotation are about the prediction, in any frame as wide.
+#[test]
+fn bands_of_rotations_are_about_the_prediction() {
+    let recorded = screws(5, 1.0, 0.3, 101, 3);
     let model = fit(
         &demonstrations(&recorded),
         &FitOptions::discrete()
@@ -605,7 +609,17 @@ fn suspicious_rotations_are_reported_or_refused() {
     .unwrap();
     let prediction = model.predict(&[1.5]).unwrap();
     assert_eq!(prediction.conditions.goal.as_ref().unwrap().len(), 7);
-    assert!(prediction_band(&model, &prediction, 0.9, grid(0.01, 1.0)).is_ok());
+    let band = prediction_band(&model, &prediction, 0.9, grid(0.01, 1.0)).unwrap();
+    assert_eq!(band.lower.dim(), (101, 6));
+    let world = prediction_band(&model.in_frame(Frame::World).unwrap(), &prediction, 0.9, grid(0.01, 1.0)).unwrap();
+    let squares = |band: &Array2<f64>, k: usize| (3..6).map(|d| band[[k, d]].powi(2)).sum::<f64>();
+    for k in 0..101 {
+        assert!((3..6).all(|d| band.lower[[k, d]] == -band.upper[[k, d]]));
+        // The trace of a covariance does not depend on the frame.
+        let (own, other) = (squares(&band.upper, k), squares(&world.upper, k));
+        assert!((own - other).abs() < 1e-9 * own, "{k}: {own} {other}");
+    }
+    assert!(squares(&band.upper, 50) > 1e-4);
 }
 
 /// Two demonstrations nearly half a turn apart have a mean between them, and both are reproduced.

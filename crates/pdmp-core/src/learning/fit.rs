@@ -1,5 +1,6 @@
 //! Learning of a primitive from demonstrations: the four steps of Section 3.2.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use ndarray::{Array2, s};
@@ -9,7 +10,7 @@ use crate::demonstration::{ContextValue, Demonstration};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::learning::alignment::{Aligned, Alignment, TimeScaling};
+use crate::learning::alignment::{Aligned, Alignment, TimeScaling, Timing};
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
 use crate::learning::style_selection::cross_validation::StyleSelection;
@@ -25,7 +26,8 @@ use super::constants::Constants;
 use super::movement_metric::{metric, residual_variance};
 use super::noise_findings;
 use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
-use super::rotations::Residuals;
+use super::rotation_timing;
+use super::rotations::{Residuals, vectors_of};
 use super::stiffness::stiffness;
 use super::style_selection::singular_values;
 use super::tabulation::compile;
@@ -85,9 +87,15 @@ pub fn fit_with(
         findings.extend(cycle_ends(demos));
     }
     let whole = unwound(demos);
-    let residuals = Residuals::of(&whole, options)?;
+    let vectors = vectors_of(&whole)?;
+    let mut aligning = |share| progress(Stage::Align, share);
+    let timing = if vectors.is_empty() || options.time_scaling == TimeScaling::Linear {
+        None
+    } else {
+        Some(time_rotations(&whole, &vectors, options, &mut aligning)?)
+    };
+    let residuals = Residuals::of(&whole, options, timing.as_ref().map(|(timing, _)| timing))?;
     let demos = residuals.as_ref().map_or(&*whole, |residuals| &residuals.demos);
-    let vectors = residuals.as_ref().map(Residuals::vectors).unwrap_or_default();
     let alignment = Alignment { vectors: vectors.clone(), ..options.alignment() };
     let mut aligned = alignment.align(demos, threads)?;
     let contexts = contexts_of(demos, options.contexts.as_deref())?;
@@ -97,8 +105,16 @@ pub fn fit_with(
     }
     let (names, units) = labels_of(demos)?;
     let constants = Constants::of(options, &aligned)?;
-    let mut aligning = |share| progress(Stage::Align, share);
-    let template = scale_time(&mut aligned, options, &constants, &units, contexts.as_ref(), &mut aligning)?;
+    let template = match timing {
+        Some((timing, template)) => {
+            aligned.set_timing(timing);
+            template
+        }
+        None => {
+            let unit = options.dof_scale.given(demos[0].n_dofs())?;
+            scale_time(&mut aligned, options, &constants, &units, contexts.as_ref(), unit, &mut aligning)?
+        }
+    };
     let mut targeting = |share| progress(Stage::Targets, share);
     let mut targets = Targets::of(&aligned, constants.attractor, constants.canonical, threads, &mut targeting)?;
     let mut ranges = targets.ranges();
@@ -213,10 +229,10 @@ fn scale_time(
     constants: &Constants,
     units: &[String],
     contexts: Option<&Contexts>,
+    unit: Option<&[f64]>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Option<WarpTemplate>> {
     let (scaling, threads) = (&options.time_scaling, options.threads);
-    let unit = options.dof_scale.given(aligned.demo(0).n_dofs())?;
     let Some((columns, numbers)) = contexts.filter(|_| *scaling == TimeScaling::WarpIfBetter) else {
         return scaling.apply(aligned, unit, threads, progress);
     };
@@ -239,6 +255,25 @@ fn scale_time(
     }
     *aligned = linear;
     Ok(None)
+}
+
+/// Scales the time of demonstrations with rotations, and returns the template of the warp that is kept, if any.
+fn time_rotations(
+    demos: &[Demonstration],
+    vectors: &[Range<usize>],
+    options: &FitOptions,
+    progress: &mut dyn FnMut(f64) -> Result<()>,
+) -> Result<(Timing, Option<WarpTemplate>)> {
+    let integrated = rotation_timing::integrated(demos, options.canonical.kind())?;
+    let alignment = Alignment { vectors: vectors.to_vec(), ..options.alignment() };
+    let mut aligned = alignment.align(&integrated, options.threads)?;
+    let contexts = contexts_of(demos, options.contexts.as_deref())?;
+    let constants = Constants::of(options, &aligned)?;
+    let (_, units) = labels_of(&integrated)?;
+    let scales = rotation_timing::scales(&integrated, vectors);
+    let unit = options.dof_scale.given(scales.len())?.unwrap_or(&scales);
+    let template = scale_time(&mut aligned, options, &constants, &units, contexts.as_ref(), Some(unit), progress)?;
+    Ok((aligned.timing(), template))
 }
 
 /// Targets with the demonstrations and constants that they were computed from.

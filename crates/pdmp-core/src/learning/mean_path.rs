@@ -8,6 +8,7 @@
 
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::mean_rotation::{MeanRotation, end_motion};
+use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::numerics::rotation::{self, Quaternion, add_scaled, distance, dot, exp, normalised, product};
@@ -31,6 +32,8 @@ pub(super) struct Recording {
     pub(super) duration: f64,
     /// Unit quaternions (n,) with continuous signs.
     pub(super) rotations: Vec<Quaternion>,
+    /// Time as a function of phase; `None` for linear time.
+    pub(super) warp: Option<WarpingFunction>,
 }
 
 impl Recording {
@@ -47,7 +50,7 @@ impl Recording {
         (time, period, Array2::from_shape_fn((copies * n, 4), |(c, i)| sign(c) * q[c % n][i]))
     }
 
-    /// Returns the rotations at the ends of equal parts of the duration.
+    /// Returns the rotations at the ends of equal parts of the phase.
     fn resampled(&self, kind: Kind, parts: usize) -> Vec<Quaternion> {
         let (time, period, values) = self.components(kind);
         let knots = match period {
@@ -55,7 +58,8 @@ impl Recording {
             Some(period) => Knots::periodic(time, period),
         };
         let mut rows = vec![0.0; 4 * (parts + 1)];
-        let times = (0..=parts).map(|k| self.duration * k as f64 / parts as f64);
+        let share = |phase: f64| self.warp.as_ref().map_or(phase, |warp| warp.share(phase));
+        let times = (0..=parts).map(|k| self.duration * share(k as f64 / parts as f64));
         Splines::through(knots, crate::validate::row_major(&values), 4).sample(times, &mut rows);
         rows.chunks_exact(4).map(|q| normalised(std::array::from_fn(|i| q[i]))).collect()
     }
@@ -90,7 +94,8 @@ pub(super) fn mean_path(
             .map(|k| duration * k as f64 / parts as f64)
             .collect();
         rotations.truncate(if kind == Kind::Discrete { parts + 1 } else { parts });
-        let (time, period, values) = Recording { time, duration, rotations: rotations.clone() }.components(kind);
+        let (time, period, values) =
+            Recording { time, duration, rotations: rotations.clone(), warp: None }.components(kind);
         let smoothed = Samples { time: &time, period, values: values.view() }.smoothed(&[Some(hz); 4]);
         let rows = smoothed.rows().into_iter().take(parts + 1);
         rotations = rows.map(|q| normalised(std::array::from_fn(|i| q[i]))).collect();

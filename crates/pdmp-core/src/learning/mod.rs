@@ -14,6 +14,7 @@ mod movement_metric;
 mod noise_findings;
 pub(crate) mod options;
 pub mod regression;
+mod rotation_timing;
 mod rotations;
 mod stiffness;
 mod style_inference;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, ArrayView1};
 
-use super::alignment::{Alignment, TimeScaling};
+use super::alignment::{Alignment, Timing};
 use super::constants::Constants;
 use super::fit::labels_of;
 use super::mean_path::{Recording, mean_path};
@@ -18,7 +18,6 @@ use crate::model::coordinates::{Coordinates, Frame, layout};
 use crate::model::finding::Finding;
 use crate::numerics::rotation::{Quaternion, Vector, add_scaled, distance, dot, inverse, log, log_near, product};
 use crate::numerics::smoothing_spline::Smoothing;
-use crate::numerics::threads::Threads;
 use crate::validate::check_range;
 
 /// Residual rotation that is reported: beyond it the residuals are distorted by a tenth or more.
@@ -48,20 +47,11 @@ impl Residuals {
     /// Returns the demonstrations in degrees of freedom; `None` if they have no rotations.
     ///
     /// # Errors
-    /// Rotations that differ between demonstrations, time that is not scaled linearly, a rotation of more than 50° between
-    /// samples, or a residual rotation of half a turn.
-    pub(super) fn of(demos: &[Demonstration], options: &FitOptions) -> Result<Option<Self>> {
+    /// A rotation of more than 50° between samples, or a residual rotation of half a turn.
+    pub(super) fn of(demos: &[Demonstration], options: &FitOptions, timing: Option<&Timing>) -> Result<Option<Self>> {
         let columns = demos.first().map_or(&[][..], Demonstration::rotations);
-        if let Some(m) = demos.iter().position(|demo| demo.rotations() != columns) {
-            return Err(Error::Argument { name: "rotations", problem: "differ from those of demo 0" }.in_demo(m));
-        }
         if columns.is_empty() {
             return Ok(None);
-        }
-        if options.time_scaling != TimeScaling::Linear {
-            let problem =
-                "must be linear for demonstrations with rotations: time warps and landmarks do not apply to them";
-            return Err(Error::Argument { name: "time_scaling", problem });
         }
         if let Some(length) = options.rotation_length {
             let valid = (1e-6..=1e6).contains(&length);
@@ -73,7 +63,10 @@ impl Residuals {
             )?;
         }
         let alignment = Alignment { smoothing: Smoothing::Interpolate, ..options.alignment() };
-        let aligned = alignment.align(demos, options.threads)?;
+        let mut aligned = alignment.align(demos, options.threads)?;
+        if let Some(timing) = timing {
+            aligned.set_timing(timing.clone());
+        }
         let canonical = Constants::of(options, &aligned)?.canonical;
         let durations = aligned.durations();
         let seconds: Vec<Vec<f64>> = (0..demos.len()).map(|m| aligned.seconds(m)).collect();
@@ -83,10 +76,10 @@ impl Residuals {
         for &rotation in columns {
             let recordings: Vec<Recording> = demos
                 .iter()
-                .zip(seconds.iter().zip(&durations))
-                .map(|(demo, (time, &duration))| {
-                    let rotations = rotations(demo, rotation);
-                    Recording { time: time.clone(), duration, rotations }
+                .enumerate()
+                .map(|(m, demo)| {
+                    let (rotations, warp) = (rotations(demo, rotation), aligned.warp_of(m).cloned());
+                    Recording { time: seconds[m].clone(), duration: durations[m], rotations, warp }
                 })
                 .collect();
             let range = |recording: &Recording| {
@@ -102,11 +95,7 @@ impl Residuals {
         let (names, units) = labels_of(demos)?;
         let (plain, dofs) = layout(names.len(), columns);
         let labels = dof_labels(&names, &units, &plain, columns);
-        let phases: Vec<Vec<f64>> = seconds
-            .into_iter()
-            .zip(&durations)
-            .map(|(time, duration)| time.into_iter().map(|t| t / duration).collect())
-            .collect();
+        let phases: Vec<Vec<f64>> = (0..demos.len()).map(|m| aligned.phases(m)).collect();
         let extent = canonical.extent();
         let converted = demos.iter().enumerate().map(|(m, demo)| {
             let clock: Vec<f64> = phases[m].iter().map(|phase| phase * extent).collect();
@@ -198,26 +187,30 @@ impl Residuals {
     }
 }
 
-/// Returns a demonstration in the degrees of freedom of a model.
+/// Returns a demonstration in the degrees of freedom of a model, given the phases of its samples.
 ///
 /// # Errors
-/// Rotations that are not those of the model, or a residual rotation of half a turn.
-pub(super) fn about_means(
-    demo: &Demonstration,
-    coordinates: &Coordinates,
-    alignment: &Alignment,
-) -> Result<Demonstration> {
-    if demo.rotations() != coordinates.columns() {
-        return Err(Error::Argument { name: "rotations", problem: "differ from those of the model" });
-    }
-    let aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
-    let (seconds, duration, extent) =
-        (aligned.seconds(0), aligned.durations()[0], coordinates.dofs().canonical().extent());
-    let clock: Vec<f64> = seconds.into_iter().map(|t| t / duration * extent).collect();
+/// A residual rotation of half a turn.
+pub(super) fn about_means(demo: &Demonstration, coordinates: &Coordinates, phases: &[f64]) -> Result<Demonstration> {
+    let extent = coordinates.dofs().canonical().extent();
+    let clock: Vec<f64> = phases.iter().map(|phase| phase * extent).collect();
     let means: Vec<_> =
         coordinates.rotations().iter().map(|rotation| (rotation.columns, rotation.mean.clone())).collect();
     let (plain, dofs) = layout(coordinates.n_coordinates(), demo.rotations());
     in_dofs(demo, &clock, extent, &means, &plain, &dofs)
+}
+
+/// Returns the DoFs of each rotation of demonstrations, none without rotations.
+///
+/// # Errors
+/// Rotations that differ between demonstrations.
+pub(super) fn vectors_of(demos: &[Demonstration]) -> Result<Vec<Range<usize>>> {
+    let columns = demos.first().map_or(&[][..], Demonstration::rotations);
+    if let Some(m) = demos.iter().position(|demo| demo.rotations() != columns) {
+        return Err(Error::Argument { name: "rotations", problem: "differ from those of demo 0" }.in_demo(m));
+    }
+    let n = demos.first().map_or(0, Demonstration::n_coordinates);
+    Ok(layout(n, columns).1.into_iter().map(|dof| dof..dof + 3).collect())
 }
 
 /// Returns the recorded rotations of a demonstration.
@@ -278,7 +271,7 @@ pub(super) fn in_dofs(
 }
 
 /// Returns the names and units of the degrees of freedom. Those of a rotation are about the axes x, y and z.
-fn dof_labels(
+pub(super) fn dof_labels(
     names: &[String],
     units: &[String],
     plain: &[[usize; 2]],

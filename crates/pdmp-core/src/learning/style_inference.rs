@@ -6,11 +6,12 @@ use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use ndarray::{Array2, ArrayView2};
 
-use super::{cycle_phase, rotations};
+use super::rotations::{self, vectors_of};
+use super::{cycle_phase, rotation_timing};
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
-use crate::learning::alignment::Alignment;
+use crate::learning::alignment::{Aligned, Alignment};
 use crate::learning::targets::Targets;
 use crate::model::conditions::Conditions;
 use crate::model::{Coordinates, Model};
@@ -116,7 +117,10 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
         let inside = Model { primitive: Arc::clone(primitive.inside()), ..model.clone() };
         return style_about_means(&inside, demo, coordinates, &alignment, options);
     }
-    let Estimate { style, described, .. } = estimate(model, demo, &alignment, options)?;
+    let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
+    aligned.noise = model.learnt.noise.clone();
+    scale_time(&mut aligned, model, options)?;
+    let Estimate { style, described, .. } = estimate(model, aligned)?;
     described.map(|()| style)
 }
 
@@ -138,40 +142,43 @@ fn style_about_means(
     alignment: &Alignment,
     options: &StyleOptions,
 ) -> Result<Vec<f64>> {
-    let mut shifted = None;
-    let mut shifts = 0;
+    if demo.rotations() != coordinates.columns() {
+        return Err(Error::Argument { name: "rotations", problem: "differ from those of the model" });
+    }
+    let kind = inside.kind();
+    let vectors = vectors_of(std::slice::from_ref(demo))?;
+    let by_shape = rotation_timing::alignment(alignment, vectors);
+    let (mut shifted, mut shift) = (None, 0);
     loop {
         let demo = shifted.as_ref().unwrap_or(demo);
-        let aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
-        let (times, duration) = (aligned.seconds(0), aligned.durations()[0]);
-        let lead = if inside.kind() == Kind::Rhythmic && shifts == 0 {
-            if demo.rotations() == coordinates.columns() {
-                let phases: Vec<f64> = times.iter().map(|t| std::f64::consts::TAU * t / duration).collect();
-                cycle_phase::lead_before_mean(demo, &phases, coordinates)
-            } else {
-                0
-            }
+        let integrated = rotation_timing::integrated(std::slice::from_ref(demo), kind)?;
+        let mut timed = by_shape.align(&integrated, Threads::ONE)?;
+        let (times, period) = (timed.seconds(0), timed.durations()[0]);
+        let lead = if kind == Kind::Rhythmic && shift == 0 {
+            let phases: Vec<f64> = timed.phases(0).into_iter().map(|phase| phase * std::f64::consts::TAU).collect();
+            cycle_phase::lead_before_mean(demo, &phases, coordinates)
         } else {
-            let residuals = rotations::about_means(demo, coordinates, alignment)?;
-            let Estimate { style, lead, described } = estimate(inside, &residuals, alignment, options)?;
+            scale_time(&mut timed, inside, options)?;
+            let residuals = rotations::about_means(demo, coordinates, &timed.phases(0))?;
+            let mut aligned = alignment.align(std::slice::from_ref(&residuals), Threads::ONE)?;
+            aligned.noise = inside.learnt.noise.clone();
+            aligned.set_timing(timed.timing());
+            let Estimate { style, lead, described } = estimate(inside, aligned)?;
             let lead = (lead * times.len() as f64).round() as usize % times.len();
-            if lead == 0 || shifts == MAX_SHIFTS {
+            if lead == 0 || shift == MAX_SHIFTS {
                 return described.map(|()| style);
             }
             lead
         };
-        shifts += 1;
         if lead > 0 {
-            shifted = Some(cycle_phase::beginning_at(demo, lead, &times, duration)?);
+            shifted = Some(cycle_phase::beginning_at(demo, lead, &times, period)?);
         }
+        shift += 1;
     }
 }
 
-/// Estimates the style of a demonstration whose columns are the degrees of freedom.
-fn estimate(model: &Model, demo: &Demonstration, alignment: &Alignment, options: &StyleOptions) -> Result<Estimate> {
-    let n_dofs = model.n_dofs();
-    let mut aligned = alignment.align(std::slice::from_ref(demo), Threads::ONE)?;
-    aligned.noise = model.learnt.noise.clone();
+/// Scales the time of the only demonstration as in the fit.
+fn scale_time(aligned: &mut Aligned, model: &Model, options: &StyleOptions) -> Result<()> {
     let by_landmarks = model.learnt.template.is_none() && model.demonstrated.segment_durations.ncols() > 1;
     match (&model.learnt.template, options.landmarks.as_deref()) {
         (None, Some(landmarks)) if by_landmarks => aligned.register_to(model.breaks(), landmarks)?,
@@ -190,6 +197,12 @@ fn estimate(model: &Model, demo: &Demonstration, alignment: &Alignment, options:
         (Some(template), None) => aligned.warp_to(template),
         (None, None) => {}
     }
+    Ok(())
+}
+
+/// Estimates the style of a demonstration whose columns are the degrees of freedom.
+fn estimate(model: &Model, aligned: Aligned) -> Result<Estimate> {
+    let n_dofs = model.n_dofs();
     let mut targets = Targets::of(&aligned, model.attractor, model.canonical(), Threads::ONE, &mut |_| Ok(()))?;
     targets.carry(&model.transport, model.attractor, model.canonical());
     targets.scale(&model.learnt.dof_scale);

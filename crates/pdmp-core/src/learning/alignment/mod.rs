@@ -86,6 +86,14 @@ pub(crate) struct Aligned<'a> {
     pub(crate) n_samples: usize,
 }
 
+/// Time scaling of demonstrations.
+#[derive(Clone, Debug)]
+pub(crate) struct Timing {
+    warps: Vec<Option<WarpingFunction>>,
+    breaks: Vec<f64>,
+    segment_durations: Array2<f64>,
+}
+
 impl Alignment {
     /// Returns the demonstrations with linear time scaling, and estimates their noise.
     ///
@@ -182,6 +190,30 @@ impl Aligned<'_> {
     /// Changes the number of samples.
     pub(crate) fn resampled(self, n_samples: usize) -> Self {
         Self { n_samples, ..self }
+    }
+
+    /// Returns the time scaling.
+    pub(crate) fn timing(&self) -> Timing {
+        let Self { warps, breaks, segment_durations, .. } = self;
+        Timing { warps: warps.clone(), breaks: breaks.clone(), segment_durations: segment_durations.clone() }
+    }
+
+    /// Scales time as that of demonstrations with the same sample times.
+    pub(crate) fn set_timing(&mut self, timing: Timing) {
+        let Timing { warps, breaks, segment_durations } = timing;
+        (self.warps, self.breaks, self.segment_durations) = (warps, breaks, segment_durations);
+    }
+
+    /// Returns the warping function of demonstration `m`; `None` for linear time.
+    pub(crate) fn warp_of(&self, m: usize) -> Option<&WarpingFunction> {
+        self.warps[m].as_ref()
+    }
+
+    /// Returns the phases of the samples of demonstration `m` (n,), from 0 to 1.
+    pub(crate) fn phases(&self, m: usize) -> Vec<f64> {
+        let duration = self.clocks[m].duration;
+        let phase = |t: f64| self.warps[m].as_ref().map_or(t / duration, |warp| warp.phase(t)[0]);
+        self.seconds(m).into_iter().map(phase).collect()
     }
 
     /// Returns demonstration `m` as recorded.
