@@ -205,6 +205,8 @@ impl TimeLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::rate_limits::RateLimits;
+    use crate::numerics::simd::F64x4;
 
     /// The registers of the processor and portable ones yield the same curve and the same law to the last bit, with a DoF that
     /// rests, one that reverses, and lanes without limits.
