@@ -7,9 +7,8 @@
 //! exactly at both ends of a tick and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows
 //! the clock of the phase relative to that of the output system, and adds to ẏ and ÿ.
 //!
-//! [`Controller::update`] and the setters neither allocate nor lock nor panic. A tick costs O(J·D), independent of the
-//! training data, in one step if it is shorter than 1/500 of the movement and 1/95 of each transition in progress, and in
-//! proportionally many substeps otherwise, at most 1000.
+//! [`Controller::update`] and the setters neither allocate nor lock nor panic. A tick costs O(J·D): one step if it is shorter
+//! than 1/500 of the movement and 1/95 of each transition in progress, else proportionally many substeps, at most 1000.
 
 mod coupling;
 mod forecast;
