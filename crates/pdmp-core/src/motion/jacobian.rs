@@ -150,7 +150,8 @@ fn in_coordinates(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Array3<f64>> {
     if derivative != Derivative::Position {
-        let problem = "must be 0 for a model with rotations: Jacobians of angular velocities do not exist";
+        let problem = "must be 0 for a model with rotations: Jacobians of angular velocities do not exist; compare rollouts of \
+                       two conditions";
         return Err(Error::Argument { name: "derivative", problem });
     }
     let fixed = match variable {
