@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::{Demonstration, Sampling};
@@ -72,6 +72,11 @@ impl RotationColumns {
             return Ok(q.map(|x| x / norm));
         }
         Err(Error::Rotation(RotationError::Norm { name, row, column: self.column, norm }))
+    }
+
+    /// Returns the quaternions of rows as [`RotationColumns::unit`].
+    pub(crate) fn units(self, name: &'static str, rows: ArrayView2<f64>) -> Result<Vec<Quaternion>> {
+        rows.rows().into_iter().enumerate().map(|(t, row)| self.unit(name, Some(t), &row.to_vec())).collect()
     }
 }
 

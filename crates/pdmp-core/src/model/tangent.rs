@@ -40,7 +40,7 @@ pub fn to_tangent(
     let mut dofs = Array2::zeros((position.nrows(), position.ncols() - rotations.len()));
     plain.iter().for_each(|&[column, dof]| dofs.column_mut(dof).assign(&position.column(column)));
     for (columns, dof) in rotations.iter().zip(firsts) {
-        let pairs = read("reference", reference, *columns)?.into_iter().zip(read("position", position, *columns)?);
+        let pairs = columns.units("reference", reference)?.into_iter().zip(columns.units("position", position)?);
         for (t, (from, to)) in pairs.enumerate() {
             let vector = log(product(inverse(from), to));
             (0..3).for_each(|i| dofs[[t, dof + i]] = vector[i]);
@@ -66,7 +66,7 @@ pub fn from_tangent(
     let mut position = Array2::zeros(reference.dim());
     plain.iter().for_each(|&[column, dof]| position.column_mut(column).assign(&dofs.column(dof)));
     for (columns, dof) in rotations.iter().zip(firsts) {
-        for (t, q) in read("reference", reference, *columns)?.into_iter().enumerate() {
+        for (t, q) in columns.units("reference", reference)?.into_iter().enumerate() {
             let turned = product(q, exp(std::array::from_fn(|i| dofs[[t, dof + i]])));
             write(turned, *columns, t, &mut position);
         }
@@ -101,7 +101,7 @@ pub fn mean_positions(positions: &[ArrayView2<f64>], rotations: &[RotationColumn
     }
     let mut means = sum / positions.len() as f64;
     for columns in rotations {
-        let all = positions.iter().map(|position| read("position", *position, *columns)).collect::<Result<Vec<_>>>()?;
+        let all = positions.iter().map(|position| columns.units("position", *position)).collect::<Result<Vec<_>>>()?;
         let mut near = all[0].first().copied();
         for t in 0..first.nrows() {
             let start = near.unwrap_or([1.0, 0.0, 0.0, 0.0]);
@@ -118,11 +118,6 @@ fn check_same(reference: ArrayView2<f64>, position: ArrayView2<f64>) -> Result<(
     check_length("position", position.nrows(), reference.nrows(), "row of the reference")?;
     check_matrix("reference", reference)?;
     check_matrix("position", position)
-}
-
-fn read(name: &'static str, position: ArrayView2<f64>, columns: RotationColumns) -> Result<Vec<Quaternion>> {
-    let rows = position.rows().into_iter().enumerate();
-    rows.map(|(t, row)| columns.unit(name, Some(t), &row.to_vec())).collect()
 }
 
 fn write(q: Quaternion, columns: RotationColumns, row: usize, position: &mut Array2<f64>) {

@@ -104,8 +104,7 @@ fn read(name: &'static str, rows: ArrayView2<f64>, column: usize, order: Quatern
     let per = if column == 0 { "component" } else { "component of position and quaternion" };
     check_length(name, rows.ncols(), column + 4, per)?;
     check_matrix(name, rows)?;
-    let columns = RotationColumns { column, order };
-    rows.rows().into_iter().enumerate().map(|(t, row)| columns.unit(name, Some(t), &row.to_vec())).collect()
+    RotationColumns { column, order }.units(name, rows)
 }
 
 /// Returns rotations as rows of unit quaternions, with signs that are continuous from w ≥ 0.
