@@ -14,32 +14,30 @@ pub(crate) struct SampledPath {
     n_groups: usize,
     /// y, y′ and y″ (N + 1, groups of DoFs) by rows.
     samples: Vec<[F64x4; 3]>,
-    n_rotations: usize,
+    /// Number of rotations that are sampled, 0 without limits of rotations.
+    n_turns: usize,
     /// Angular velocity and acceleration per unit of the clock (N + 1, rotations) by rows, in the body frame.
     turns: Vec<TurnDerivatives>,
-    /// True if the rotations are sampled.
-    has_turns: bool,
 }
 
-clone_in_place!(SampledPath { clock, n_groups, samples, n_rotations, turns, has_turns });
+clone_in_place!(SampledPath { clock, n_groups, samples, n_turns, turns });
 
 impl SampledPath {
     /// Returns a path of groups of DoFs and rotations at knots that has not been sampled yet.
     pub(crate) fn at(clock: Vec<f64>, n_groups: usize, n_rotations: usize) -> Self {
         let samples = vec![[F64x4::ZERO; 3]; clock.len() * n_groups];
         let turns = vec![TurnDerivatives::default(); clock.len() * n_rotations];
-        Self { samples, n_groups, n_rotations, turns, has_turns: false, clock }
+        Self { samples, n_groups, n_turns: 0, turns, clock }
     }
 
     /// Sets whether the rotations are sampled, for limits along the path.
     pub(crate) fn sample_turns(&mut self, limits: &PathLimits) {
-        self.has_turns = limits.have_rotations();
+        self.n_turns = if limits.have_rotations() { limits.rotations.len() } else { 0 };
     }
 
     /// Returns the samples of the rotations at a knot; none where they are not sampled.
     pub(crate) fn turns_mut(&mut self, index: usize) -> &mut [TurnDerivatives] {
-        let n = if self.has_turns { self.n_rotations } else { 0 };
-        &mut self.turns[index * n..(index + 1) * n]
+        &mut self.turns[index * self.n_turns..(index + 1) * self.n_turns]
     }
 
     /// Returns the samples of the rotations at both ends of interval `index`, with their limits; none without limits of rotations.
@@ -49,7 +47,7 @@ impl SampledPath {
         index: usize,
         limits: &'a PathLimits,
     ) -> impl Iterator<Item = ([TurnDerivatives; 2], &'a AngularLimits)> {
-        let n = if self.has_turns { self.n_rotations } else { 0 };
+        let n = self.n_turns;
         let turns = &self.turns[index * n..(index + 2) * n];
         limits.rotations.iter().take(n).enumerate().map(move |(i, limits)| ([turns[i], turns[i + n]], limits))
     }

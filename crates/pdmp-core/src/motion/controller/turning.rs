@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use super::Controller;
+use super::limiting::NEAR_LIMIT;
 use super::pose::{Pose, place, set_vector, vector_at};
 use super::step::first_element;
 use crate::error::Result;
@@ -16,9 +17,6 @@ use crate::motion::viability::MIN_TICK;
 use crate::numerics::rotation::{Turning, Vector, add_scaled, dot};
 use crate::numerics::simd::unpack;
 use crate::numerics::state::Visitor;
-
-/// Share of a limit from which a rotation slows the clock.
-const NEAR_LIMIT: f64 = super::limiting::NEAR_LIMIT;
 
 /// Limits of a rotation, and its motion at the start of the tick that they apply to.
 #[derive(Clone, Copy, Debug)]
