@@ -50,11 +50,8 @@ pub(crate) fn euler_to_quaternions<'py>(
     unit: Choice<'_>,
     order: Choice<'_>,
 ) -> PyResult<Numbers<'py>> {
-    let (mut angles, sequence) = (Samples::of("angles", angles, &[3])?, sequence_of(sequence)?);
-    let (unit, order) = (unit.of("unit", &UNITS)?, order.of("order", &ORDERS)?);
-    if matches!(unit, AngleUnit::Degree) {
-        angles.rows.mapv_inplace(f64::to_radians);
-    }
+    let (angles, sequence) = (Samples::of_angles(angles, &[3], unit)?, sequence_of(sequence)?);
+    let order = order.of("order", &ORDERS)?;
     angles.map(py, |angles| orientation::euler_to_quaternions(angles, sequence, order))
 }
 

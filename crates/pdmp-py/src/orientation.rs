@@ -255,8 +255,8 @@ pub(crate) fn axis_angles_to_quaternions<'py>(
     order: Choice<'_>,
 ) -> PyResult<Numbers<'py>> {
     let (mut axes, order) = (Samples::of("axes", axes, &[3])?, order.of("order", &ORDERS)?);
-    let angles = Samples::of("angles", angles, &[])?;
-    let radians: Vec<f64> = in_radians(angles.rows.iter().copied(), unit.of("unit", &UNITS)?);
+    let angles = Samples::of_angles(angles, &[], unit)?;
+    let radians: Vec<f64> = angles.rows.iter().copied().collect();
     if axes.is_single {
         let shape = [radians.len(), 3];
         axes.rows = axes.rows.broadcast(IxDyn(&shape)).map(|rows| rows.to_owned()).unwrap_or(axes.rows);
@@ -265,16 +265,9 @@ pub(crate) fn axis_angles_to_quaternions<'py>(
     axes.map(py, |axes| orientation::axis_angles_to_quaternions(axes, &radians, order))
 }
 
-fn in_radians(angles: impl Iterator<Item = f64>, unit: AngleUnit) -> Vec<f64> {
-    match unit {
-        AngleUnit::Rad => angles.collect(),
-        AngleUnit::Degree => angles.map(f64::to_radians).collect(),
-    }
-}
-
 /// Samples along time, or a single one.
 pub(crate) struct Samples {
-    pub(crate) rows: ArrayD<f64>,
+    rows: ArrayD<f64>,
     is_single: bool,
 }
 
@@ -298,6 +291,15 @@ impl Samples {
         Err(PyValueError::new_err(format!(
             "{name} has shape {found}, expected {series} along time, or one sample {one}"
         )))
+    }
+
+    /// Returns angles of a given shape in rad.
+    pub(crate) fn of_angles(value: &Bound<'_, PyAny>, shape: &[usize], unit: Choice<'_>) -> PyResult<Self> {
+        let mut angles = Self::of("angles", value, shape)?;
+        if matches!(unit.of("unit", &UNITS)?, AngleUnit::Degree) {
+            angles.rows.mapv_inplace(f64::to_radians);
+        }
+        Ok(angles)
     }
 
     /// Converts the samples.
