@@ -5,6 +5,8 @@
 mod common;
 #[path = "common/random.rs"]
 mod random;
+#[path = "common/rare_commands.rs"]
+mod rare_commands;
 
 use std::sync::Arc;
 
@@ -12,6 +14,7 @@ use common::*;
 use pdmp_core::motion::{Coupling, Limit, Limits, TimeGrid, fastest, fastest_tau};
 use pdmp_core::{Command, Conditions, Controller, Error, Kind, LimitError, Model, Status, rollout};
 use random::Random;
+use rare_commands::*;
 
 fn controller(model: &Arc<Model>) -> Controller {
     Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap()
@@ -99,18 +102,8 @@ fn no_command_leaves_the_limits() {
             let (goal, measured) = (vector(&mut random, scale), vector(&mut random, 1.0));
             let terms = vector(&mut random, scale);
             let style: Vec<f64> = (0..j).map(|_| random.between(-2.0, 2.0)).collect();
-            let rare = |random: &mut Random| random.next() < 0.01;
-            let discrete = model.kind() == Kind::Discrete;
-            let command = Command {
-                dt: Some(h),
-                goal: (discrete && rare(&mut random)).then_some(&goal),
-                anchor: (!discrete && rare(&mut random)).then_some(&goal),
-                style: rare(&mut random).then_some(&style),
-                tau: rare(&mut random).then(|| model.tau() * random.scale(0.1, 10.0)),
-                measured: rare(&mut random).then_some(&measured),
-                coupling: rare(&mut random).then_some(Coupling { velocity: &terms, acceleration: &terms }),
-                ..Command::default()
-            };
+            let numbers = Numbers { centre: &goal, style: &style, measured: &measured, terms: &terms };
+            let command = rare_command(model, h, &numbers, &mut random);
             controller.step_with(&command).unwrap();
             let after = motion(&controller);
             assert!(after.0.iter().chain(&after.1).all(|x| x.is_finite()), "{case} {tick}");

@@ -5,11 +5,14 @@
 mod common;
 #[path = "common/counting.rs"]
 mod counting;
+#[path = "common/rare_commands.rs"]
+mod rare_commands;
 
 use common::*;
 use counting::{Random, allocations};
-use pdmp_core::motion::{Coupling, Limit, Limits};
+use pdmp_core::motion::{Limit, Limits};
 use pdmp_core::{Command, Conditions, Controller, Error, Kind, LimitError, Model, Status};
+use rare_commands::*;
 
 /// Position, velocity and acceleration of one DoF.
 type State = [f64; 3];
@@ -102,17 +105,8 @@ fn no_command_breaks_a_limit() {
             }
             style.iter_mut().for_each(|number| *number = random.between(-2.0, 2.0));
             let allocated = allocations();
-            let rare = |random: &mut Random| random.next() < 0.01;
-            let command = Command {
-                dt: Some(h),
-                goal: (discrete && rare(&mut random)).then_some(&goal),
-                anchor: (!discrete && rare(&mut random)).then_some(&goal),
-                style: rare(&mut random).then_some(&style),
-                tau: rare(&mut random).then(|| model.tau() * random.scale(0.1, 10.0)),
-                measured: rare(&mut random).then_some(&measured),
-                coupling: rare(&mut random).then_some(Coupling { velocity: &terms, acceleration: &terms }),
-                ..Command::default()
-            };
+            let numbers = Numbers { centre: &goal, style: &style, measured: &measured, terms: &terms };
+            let command = rare_command(model, h, &numbers, &mut random);
             controller.step_with(&command).unwrap();
             if rare(&mut random) {
                 controller.set_speed(random.between(0.0, 2.0).floor()).unwrap();

@@ -7,18 +7,19 @@ mod common;
 mod poses;
 #[path = "common/random.rs"]
 mod random;
+#[path = "common/rare_commands.rs"]
+mod rare_commands;
 
 use std::sync::{Arc, LazyLock};
 
 use common::*;
 use ndarray::{Array1, Array2, s};
 use pdmp_core::model::Frame;
-use pdmp_core::motion::{
-    Coupling, Limit, Limits, Margins, TimeGrid, Vary, fastest, fastest_tau, feasible, nearest_feasible,
-};
+use pdmp_core::motion::{Limit, Limits, Margins, TimeGrid, Vary, fastest, fastest_tau, feasible, nearest_feasible};
 use pdmp_core::{Command, Conditions, Controller, Error, FitOptions, Kind, LimitError, Model, Status, fit, rollout};
 use poses::*;
 use random::Random;
+use rare_commands::*;
 
 /// Screws of a tool: three positions and a rotation.
 static SCREW: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(model_of_screws(IDENTITY, IDENTITY, Frame::Body)));
@@ -132,18 +133,10 @@ fn no_command_leaves_the_limits() {
             let (goal, measured) = (random_place(model, 0.3, &mut random), random_place(model, 0.3, &mut random));
             let terms: Vec<f64> = (0..n).map(|_| scale * random.between(-1.0, 1.0)).collect();
             let style: Vec<f64> = (0..j).map(|_| random.between(-2.0, 2.0)).collect();
-            let rare = |random: &mut Random| random.next() < 0.01;
-            let command = Command {
-                dt: Some(h),
-                goal: (discrete && rare(&mut random)).then_some(&goal),
-                anchor: (!discrete && rare(&mut random)).then_some(&goal),
-                style: rare(&mut random).then_some(&style),
-                tau: rare(&mut random).then(|| model.tau() * random.scale(0.1, 10.0)),
-                measured: rare(&mut random).then_some(&measured),
-                coupling: rare(&mut random).then_some(Coupling { velocity: &terms, acceleration: &terms }),
-                phase: (!discrete && rare(&mut random)).then(|| random.between(0.0, 6.0)),
-                ..Command::default()
-            };
+            let numbers = Numbers { centre: &goal, style: &style, measured: &measured, terms: &terms };
+            let command = rare_command(model, h, &numbers, &mut random);
+            let phase = (!discrete && rare(&mut random)).then(|| random.between(0.0, 6.0));
+            let command = Command { phase, ..command };
             controller.step_with(&command).unwrap();
             let after = Turn::of(&controller, frame);
             let motion = [controller.position(), controller.velocity(), controller.acceleration()];
