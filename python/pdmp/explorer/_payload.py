@@ -12,7 +12,7 @@ from pdmp._native import Conditions, Demonstration, Limits, Model
 from pdmp.explorer._contexts import context_table
 from pdmp.explorer._kinematics import stick_figure
 from pdmp.explorer._packing import packed
-from pdmp.plot.movements import check_demonstrations
+from pdmp.plot.movements import check_demonstrations, sample_times
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -169,11 +169,7 @@ def _recordings(
     n_kept = min(MAX_RECORDED_SAMPLES, n_numbers // len(chosen) + 2)
     for m in chosen:
         demo = demonstrations[m]
-        if demo.time is None:
-            ends = model.kind == "discrete"
-            time = np.linspace(0, model.durations[m], demo.n_samples, endpoint=ends)
-        else:
-            time = demo.time - demo.time[0]
+        time = sample_times(model, m, demo)
         kept = _chosen(len(time), n_kept)
         position = np.asarray(demo.position)[kept].astype(np.float32)
         found.append({"time": packed(time[kept].astype(np.float32)), "position": packed(position)})

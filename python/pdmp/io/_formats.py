@@ -42,6 +42,8 @@ SEVERAL: dict[str, Callable[..., dict[str, Demonstration]]] = {
     ".bag": read_rosbag,
 }
 """Readers of several demonstrations."""
+WITH_CONTEXTS = (read_lerobot, read_hdf5)
+"""Readers that find the named contexts of each demonstration in the file."""
 
 
 def read_single(path: Path, time: str, **options: Any) -> Demonstration:

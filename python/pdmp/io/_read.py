@@ -10,7 +10,7 @@ from typing import Any
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
 from pdmp.io._collections import ListedDemonstrations
-from pdmp.io._formats import SEVERAL, SINGLE, folder_reader, read_single
+from pdmp.io._formats import SEVERAL, SINGLE, WITH_CONTEXTS, folder_reader, read_single
 from pdmp.io.folder import read_folder
 
 
@@ -60,10 +60,9 @@ def read(
     for path in map(Path, paths):
         suffix = path.suffix.lower()
         reader = folder_reader(path) if path.is_dir() else SEVERAL.get(suffix)
-        named = None if reader is None else reader.__name__
         if path.is_dir() and reader is None:
             demos += read_folder(path, time=time, context=context, **options).values()
-        elif reader is not None and named in WITH_CONTEXTS:
+        elif reader in WITH_CONTEXTS:
             demos += reader(path, context=context, **options).values()
         elif context is not None:
             raise value_error(f"{path}: a context is read from the index.csv of a folder: pass one")
@@ -75,7 +74,3 @@ def read(
             suffixes = ", ".join([*SINGLE, *SEVERAL])
             raise value_error(f"{path}: expected a folder or a file of one of {suffixes}")
     return demos
-
-
-WITH_CONTEXTS = ("read_lerobot", "read_hdf5")
-"""Readers that find the named contexts of each demonstration in the file."""

@@ -13,6 +13,7 @@ from pdmp.plot.canvas import BLUE, GREY, colormap, draw_movement, legend, moveme
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 N_SAMPLES = 500
 
@@ -55,18 +56,22 @@ def demonstrations(
     figure, columns = movement_panels(model, titles, figure)
     for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
         panels = columns[titles.index(label)]
-        duration = model.durations[m]
-        rollout = model.rollout(model.conditions(m), dt=duration / N_SAMPLES)
-        if demo.time is not None:
-            time = demo.time - demo.time[0]
-        else:
-            time = np.linspace(0, duration, demo.n_samples, endpoint=model.kind == "discrete")
+        rollout = model.rollout(model.conditions(m), dt=model.durations[m] / N_SAMPLES)
+        time = sample_times(model, m, demo)
         draw_movement(panels, time, demo.position, color=GREY, linewidth=3, label="demonstration")
         draw_movement(
             panels, rollout.time, rollout.position, color=BLUE, linewidth=0.9, label="reproduction"
         )
     legend(figure, columns[0][0])
     return figure
+
+
+def sample_times(model: Model, m: int, demo: Demonstration) -> NDArray[np.float64]:
+    """Returns the times (T,) of the samples of demonstration m [s], from 0."""
+    if demo.time is not None:
+        return demo.time - demo.time[0]
+    ends = model.kind == "discrete"
+    return np.linspace(0, model.durations[m], demo.n_samples, endpoint=ends)
 
 
 def check_demonstrations(model: Model, demos: Sequence[Demonstration]) -> None:
