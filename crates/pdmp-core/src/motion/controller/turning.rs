@@ -15,7 +15,7 @@ use crate::motion::angular::AngularLimits;
 use crate::motion::limits::Limit;
 use crate::motion::viability::MIN_TICK;
 use crate::numerics::rotation::{Turning, Vector, add_scaled, dot};
-use crate::numerics::simd::unpack;
+use crate::numerics::simd::{F64x4, unpack};
 use crate::numerics::state::Visitor;
 
 /// Limits of a rotation, and its motion at the start of the tick that they apply to.
@@ -92,9 +92,11 @@ impl Controller {
             // Numbers near overflow have no excess.
             let change = add_scaled(wanted.velocity, -1.0, turn.velocity).map(|x| x / dt.max(MIN_TICK));
             let change = change.map(|x| if x.is_finite() { x } else { 0.0 });
-            for (dof, change) in dofs.clone().zip(change) {
+            for (dof, excess) in
+                dofs.clone().zip(self.excess_of(F64x4::new([change[0], change[1], change[2], 0.0])).to_array())
+            {
                 let (group, lane) = place(dof);
-                self.limiter.excess[group].as_mut_array()[lane] = change;
+                self.limiter.excess[group].as_mut_array()[lane] = excess;
             }
             let (group, lane) = place(dofs.start);
             let scale = self.groups[group].range.as_array()[lane].powi(-2);
