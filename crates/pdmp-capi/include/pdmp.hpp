@@ -7,6 +7,7 @@
 #ifndef PDMP_HPP
 #define PDMP_HPP
 
+#include <array>
 #include <cstddef>
 #include <iterator>
 #include <memory>
@@ -315,6 +316,43 @@ private:
 
     std::size_t n_coordinates_, n_dofs_;
     std::unique_ptr<pdmp_controller, Free> controller_;
+};
+
+/// Position and unit quaternion x, y, z, qw, qx, qy, qz.
+using Pose = std::array<double, 7>;
+
+/// Conversion between the poses of two arms and an absolute and a relative pose, see pdmp_absolute_relative. Neither direction
+/// allocates; both throw pdmp::Error for poses that are none, or arms half a turn from the reference.
+class TwoArms {
+public:
+    /// Creates the conversion by the shorter geodesic.
+    TwoArms() = default;
+
+    /// Creates the conversion about a relative rotation of the task, qw, qx, qy, qz.
+    explicit TwoArms(const std::array<double, 4> &reference) noexcept : reference_(reference) {}
+
+    /// Returns the absolute and the relative pose.
+    std::array<Pose, 2> absolute_relative(const Pose &left, const Pose &right) const {
+        return convert(pdmp_absolute_relative, left, right);
+    }
+
+    /// Returns the poses of the left and the right arm.
+    std::array<Pose, 2> left_right(const Pose &absolute, const Pose &relative) const {
+        return convert(pdmp_left_right, absolute, relative);
+    }
+
+private:
+    template <class Function>
+    std::array<Pose, 2> convert(Function function, const Pose &first, const Pose &second) const {
+        std::array<Pose, 2> poses;
+        detail::check([&](pdmp_text error) {
+            const pdmp_buffer buffers[] = {{poses[0].data(), 7}, {poses[1].data(), 7}};
+            return function(view(first), view(second), view(reference_), buffers[0], buffers[1], error);
+        });
+        return poses;
+    }
+
+    std::array<double, 4> reference_{1.0, 0.0, 0.0, 0.0};
 };
 
 }  // namespace pdmp

@@ -28,6 +28,7 @@ mod limits;
 mod model;
 mod status;
 mod trajectory;
+mod two_arms;
 
 pub use buffers::*;
 pub use command::*;
@@ -37,3 +38,4 @@ pub use limits::*;
 pub use model::*;
 pub use status::{pdmp_status, pdmp_version};
 pub use trajectory::*;
+pub use two_arms::*;

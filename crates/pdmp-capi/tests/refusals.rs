@@ -18,7 +18,7 @@ use pdmp::*;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::TimeScaling;
 use pdmp_core::model::TimeWarp;
-use pdmp_core::motion::TimeGrid;
+use pdmp_core::motion::{TimeGrid, TwoArms};
 use pdmp_core::{Error, Kind, rollout};
 
 const NO_VECTOR: pdmp_vector = pdmp_vector { data: ptr::null(), length: 0 };
@@ -758,4 +758,39 @@ fn trajectories_fill_rows_of_the_right_number() {
     assert_eq!(unsafe { pdmp_controller_forecast(running.handle(), 0.02, 50, Some(&outputs)) }, PDMP_OK);
     let own = pdmp_core::Controller::new(rust.primitive(), 1e-3, &pdmp_core::Conditions::default(), None).unwrap();
     assert_eq!(own.forecast(0.98, Some(0.02)).unwrap().position.as_slice().unwrap(), position);
+}
+
+/// Poses of two arms are those of Rust, and what the core refuses has a status and a message.
+#[test]
+fn poses_of_two_arms_are_those_of_rust() {
+    let (left, right) = ([0.5, 0.2, 0.3, 0.8, 0.6, 0.0, 0.0], [0.5, -0.2, 0.3, 0.0, 0.0, 0.6, 0.8]);
+    let reference = [0.0, 0.0, 0.0, 1.0];
+    let arms = TwoArms::about(reference).unwrap();
+    let expected = arms.absolute_relative(&left, &right).unwrap();
+    let [mut absolute, mut relative, mut again, mut other] = [[0.0; 7]; 4];
+    // SAFETY: every pointer is valid over its length.
+    unsafe {
+        let outputs = [buffer(&mut absolute), buffer(&mut relative)];
+        let inputs = [vector(&left), vector(&right), vector(&reference)];
+        let [l, r, about] = inputs;
+        assert_eq!(pdmp_absolute_relative(l, r, about, outputs[0], outputs[1], NO_TEXT), PDMP_OK);
+        assert_eq!([absolute, relative], expected);
+        let halves = [buffer(&mut again), buffer(&mut other)];
+        let status = pdmp_left_right(vector(&absolute), vector(&relative), about, halves[0], halves[1], NO_TEXT);
+        assert_eq!(status, PDMP_OK);
+        assert_eq!([again, other], arms.left_right(&absolute, &relative).unwrap());
+        assert_eq!(pdmp_absolute_relative(l, r, about, outputs[0], NO_BUFFER, NO_TEXT), PDMP_OK);
+
+        let refused = |left, right, about, output, expected, part: &str| {
+            let call = |text| pdmp_absolute_relative(left, right, about, output, NO_BUFFER, text);
+            let (status, text) = with_text(200, call);
+            assert!(status == expected && text.contains(part), "{status:?} {text}");
+        };
+        refused(NO_VECTOR, r, about, NO_BUFFER, PDMP_NULL, "left");
+        refused(l, vector(&right[..6]), about, NO_BUFFER, PDMP_LENGTH, "right");
+        refused(l, r, vector(&right), NO_BUFFER, PDMP_LENGTH, "reference");
+        refused(l, r, about, buffer(&mut absolute[..6]), PDMP_LENGTH, "absolute");
+        refused(l, vector(&[0.0; 7]), about, NO_BUFFER, PDMP_RANGE, "right");
+        refused(l, vector(&[-0.5, 0.0, 0.0, 0.0, 0.0, -0.6, 0.8]), vector(&left[3..]), NO_BUFFER, PDMP_RANGE, "right");
+    }
 }

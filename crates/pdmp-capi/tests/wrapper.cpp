@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -113,6 +114,14 @@ int main(int, char **argv) try {
     REQUIRE(copy.copy_from(first) == PDMP_NULL && first.copy_from(copy) == PDMP_NULL);
     REQUIRE(copy.error() == "controller is NULL");
     REQUIRE(status_thrown_by([&] { first.clone(); }) == PDMP_NULL);
+
+    const pdmp::Pose left{0.5, 0.25, 0.25, 1.0, 0.0, 0.0, 0.0}, right{0.5, -0.25, 0.25, 0.0, 0.0, 0.0, 1.0};
+    REQUIRE(status_thrown_by([&] { pdmp::TwoArms().absolute_relative(left, right); }) == PDMP_RANGE);
+    const pdmp::TwoArms arms({0.0, 0.0, 0.0, 1.0});
+    const auto [absolute, relative] = arms.absolute_relative(left, right);
+    REQUIRE(absolute[0] == 0.5 && absolute[1] == 0.0 && relative[6] == 1.0);
+    const auto again = arms.left_right(absolute, relative);
+    for (int k = 0; k < 7; ++k) REQUIRE(std::abs(again[0][k] - left[k]) + std::abs(again[1][k] - right[k]) < 1e-15);
 
     const auto rollout = model.rollout(model.predict({0.2}), 0.01, 40);
     REQUIRE(rollout.velocity.size() == 120);
