@@ -67,16 +67,14 @@ def test_measured_pose_spares_the_grasp(carried: dict[str, box.Record]) -> None:
     assert len(carried["closed"].commanded) > 1.2 * len(carried["open"].commanded)
 
 
-def test_tool_of_a_panda_follows_recorded_poses() -> None:
-    """Tracking errors are below 1 mm and 0.1°, in the units of the recordings."""
-    try:
-        demos = panda.tasks()["openbox"]
-    except FileNotFoundError as reason:
-        pytest.skip(str(reason))
+@pytest.mark.parametrize("task", ["openbox", "sink"])
+def test_tool_of_a_panda_follows_recorded_poses(task: str) -> None:
+    """Tracking errors are below 1 mm and 0.1°."""
+    demos = panda.tasks().get(task)
+    if demos is None:
+        pytest.skip("the recordings are not below PDMP_DATA")
     model = pdmp.fit(demos)
-    _, record = panda.run(
-        model, model.conditions(2), panda.NEAR["openbox"], closed=True, held=False
-    )
+    _, record = panda.run(model, model.conditions(2), panda.NEAR[task], closed=True, held=False)
     commanded, measured = record.rows("commanded"), record.rows("measured")
     apart, angle = box.deviation(measured, commanded)
     assert apart.max() < 1e-3 and angle.max() < np.radians(0.1)

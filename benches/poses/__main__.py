@@ -11,7 +11,6 @@ import pdmp
 from poses import box, panda
 from poses.pictures import strip
 from poses.text import text
-from recordings import is_available
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SEED = 2011
@@ -27,7 +26,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write docs/poses_in_simulation.md")
     write = parser.parse_args().write
     pandas = {}
-    for task, demos in panda.tasks().items() if is_available(panda.SOURCE) else ():
+    for task, demos in panda.tasks().items():
         model = pdmp.fit(demos)
         runs = [panda.run(model, model.conditions(SHOWN), panda.NEAR[task], **run) for run in RUNS]
         pandas[task] = [record for _, record in runs]

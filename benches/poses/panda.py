@@ -10,17 +10,20 @@ from pdmp.datasets import folder
 from pdmp.io import read_folder
 from pdmp.robots import MujocoKinematics
 from poses.inverse import InverseKinematics
+from recordings import is_available
 from reproduction.baxter import engine, specification
 from reproduction.robot import add_lights
 from reproduction.torques import DT, TorqueControlled
 
-SOURCE = "franka_tasks"
+SOURCES = ["franka_tasks", "kuka_paths"]
 COLUMNS = ["x", "y", "z", "qa", "qb", "qc", "qd"]
-DURATION = 8.0  # s; the recordings have a phase instead of the time
+DURATION = 8.0  # s; the recordings of a Franka have a phase instead of the time
+DOWNWARDS = (0.0, 1.0, 0.0, 0.0)  # orientation of the hand on the paths of a KUKA, which have none
 JOINTS = tuple(f"joint{k}" for k in range(1, 8))
 NEAR = {
     "openbox": np.array([0.06, 0.46, -0.30, -2.27, -1.66, 1.73, 1.90]),
     "pouring": np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]),
+    "sink": np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]),
 }
 """Joint angles [rad] near which the tool is for each task."""
 HELD_JOINT, HELD = 3, (3.0, 4.5)  # s, while a person holds the elbow
@@ -28,12 +31,22 @@ REST = 0.5  # s, after the movement
 
 
 def tasks() -> dict[str, list[pdmp.Demonstration]]:
-    """Reads the demonstrations of each task, tool poses (T, 7)."""
+    """Reads the demonstrations of each task, tool poses (T, 7), from the recordings that are there."""
     found = defaultdict(list)
-    for name, demo in read_folder(folder(SOURCE), columns=COLUMNS).items():
-        dt = DURATION / (demo.n_samples - 1)
-        recorded = pdmp.Demonstration(demo.position, dt=dt, rotations={3: "wxyz"})
-        found[name.partition("_")[0]].append(recorded)
+    franka, kuka = SOURCES
+    if is_available(franka):
+        for name, demo in read_folder(folder(franka), columns=COLUMNS).items():
+            dt = DURATION / (demo.n_samples - 1)
+            recorded = pdmp.Demonstration(demo.position, dt=dt, rotations={3: "wxyz"})
+            found[name.partition("_")[0]].append(recorded)
+    if is_available(kuka):
+        for name, demo in read_folder(folder(kuka)).items():
+            if name.startswith("3D_sink"):
+                # Half a turn of the base puts the paths in front of the Panda.
+                point = demo.position * [-1.0, -1.0, 1.0]
+                pose = np.hstack([point, np.tile(DOWNWARDS, (demo.n_samples, 1))])
+                recorded = pdmp.Demonstration(pose, time=demo.time, rotations={3: "wxyz"})
+                found["sink"].append(recorded)
     return dict(found)
 
 

@@ -20,10 +20,12 @@ controller.
 
 ![Frames of the Panda; path of the tool commanded in blue, measured in orange](poses_panda.png)
 
-The primitive is fitted to nine recorded tool poses of a task, and moves as the third of them, in
-{duration:g} s: the recordings have a phase instead of the time. In the last two columns, a person
-holds the elbow from {held[0]:g} to {held[1]:g} s, modelled by a stiff spring. Without `measured=`,
-the commanded pose moves on meanwhile, and the released tool rushes after it.
+The primitive is fitted to the recorded tool poses of a task, and moves as the third of them. The
+tasks `openbox` and `pouring` were recorded on a Franka, nine poses each, with a phase instead of
+the time; they take {duration:g} s here. `sink` was recorded on a KUKA, eleven paths in time without
+orientations, on which the hand points downwards. In the last two columns, a person holds the elbow
+from {held[0]:g} to {held[1]:g} s, modelled by a stiff spring. Without `measured=`, the commanded
+pose moves on meanwhile, and the released tool rushes after it.
 """
 BOX = """\
 ## A box between the hands of Baxter
@@ -141,7 +143,7 @@ def text(
         ),
         of_box(boxes),
         "",
-        sources([panda.SOURCE] if pandas else []),
+        sources(panda.SOURCES if pandas else []),
         "",
     ]
     return "\n".join(parts)
