@@ -134,7 +134,7 @@ fn three_styles_describe_unseen_rotations() {
 }
 
 /// A model learnt in another world and with another tool frame, from quaternions of any sign, moves alike in these frames:
-/// rollouts, and control loops with measurements and moved goals, with noisy recordings too.
+/// rollouts, and control loops with measurements and moved goals, with noisy positions and rotations too.
 #[test]
 fn movements_do_not_depend_on_the_frames() {
     let random = &mut Random(11);
@@ -146,15 +146,13 @@ fn movements_do_not_depend_on_the_frames() {
             let shaken = times(rotation(row.view(), 3), of_vector([(); 3].map(|()| noise * random.between(-1.7, 1.7))));
             let mut row = row;
             row.slice_mut(s![3..]).assign(&ndarray::aview1(&shaken));
+            row.slice_mut(s![..3]).mapv_inplace(|x| x + 0.5 * noise * random.between(-1.7, 1.7));
         }
         let (world, tool) = (random_rotation(random), random_rotation(random));
         let turned: Vec<_> = recorded.iter().map(|one| in_frames(one, world, tool, random)).collect();
         let [own, other] = [recorded, turned]
             .map(|poses| fit(&demonstrations(&poses), &FitOptions::discrete().n_styles(Truncation::Rank(3))).unwrap());
-        let convert = |position: &[f64]| -> Vec<f64> {
-            let q = times(times(world, std::array::from_fn(|i| position[3 + i])), tool);
-            position[..3].iter().copied().chain(q).collect()
-        };
+        let convert = |position: &[f64]| in_frame(position, world, tool);
         let mut compare = |a: &[f64], b: &[f64]| {
             let (a, b) = (convert(a), b);
             let position = (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
@@ -178,6 +176,7 @@ fn movements_do_not_depend_on_the_frames() {
                 loops[1].set_goal(&convert(&goal)).unwrap();
             }
             let mut measured = loops[0].position().to_vec();
+            measured[..3].iter_mut().for_each(|x| *x += random.between(-0.02, 0.02));
             let off = times(rotation(ndarray::aview1(&measured), 3), of_vector([0.05, random.next() * 0.2, -0.1]));
             measured[3..].copy_from_slice(&off);
             let converted = convert(&measured);
@@ -490,7 +489,7 @@ fn measurements_and_couplings_act_on_rotations() {
         controller.step_with(&Command { measured: Some(&measured), ..Command::default() }).unwrap();
     }
     assert!(angle(held, rotation(ndarray::aview1(controller.position()), 3)) < 0.2);
-    assert!(controller.phase() > 0.4 * phase, "3 s are two durations: {} {phase}", controller.phase());
+    assert!(controller.phase() > 0.3 * phase, "3 s are two durations: {} {phase}", controller.phase());
 
     let mut free = Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).unwrap();
     for _ in 0..500 {

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
-pub(crate) use rotations::{MAX_NORM_DEVIATION, layout};
+pub(crate) use rotations::{MAX_NORM_DEVIATION, layout, points};
 pub use rotations::{QuaternionOrder, RotationColumns};
 
 pub use crate::validate::MAX_MAGNITUDE;

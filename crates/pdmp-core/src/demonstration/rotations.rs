@@ -5,7 +5,7 @@ use std::ops::Range;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::{Demonstration, Sampling};
+use super::{Demonstration, Sampling, turn_of};
 use crate::error::{Error, Result, RotationError};
 
 /// Quaternion [w, x, y, z].
@@ -94,6 +94,25 @@ pub(crate) fn layout(n_coordinates: usize, rotations: &[RotationColumns]) -> (Ve
         }
     }
     (plain, firsts)
+}
+
+/// Returns the DoFs of the point of each pose: the three columns before a rotation, else after it, with one unit that is none
+/// of an angle.
+pub(crate) fn points(units: &[String], rotations: &[RotationColumns]) -> Vec<Range<usize>> {
+    let (mut plain, _) = layout(units.len(), rotations);
+    let mut points = Vec::new();
+    for rotation in rotations {
+        let dof = |column: usize| plain.iter().find(|[other, _]| *other == column).map(|[_, dof]| *dof);
+        let is_point = |&column: &usize| {
+            let mut columns = column..column + 3;
+            columns.all(|c| dof(c).is_some() && units[c] == units[column]) && turn_of(&units[column]).is_none()
+        };
+        let sides = [rotation.column.checked_sub(3), Some(rotation.column + 4)];
+        let Some(column) = sides.into_iter().flatten().find(is_point) else { continue };
+        points.extend(dof(column).map(|dof| dof..dof + 3));
+        plain.retain(|[other, _]| !(column..column + 3).contains(other));
+    }
+    points
 }
 
 impl Demonstration {

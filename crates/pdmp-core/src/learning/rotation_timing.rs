@@ -12,7 +12,7 @@
 
 use std::ops::Range;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView1, ArrayView2};
 
 use super::alignment::Alignment;
 use super::fit::labels_of;
@@ -20,7 +20,7 @@ use super::rotations::dof_labels;
 use crate::demonstration::{Demonstration, layout};
 use crate::error::Result;
 use crate::kind::Kind;
-use crate::numerics::rotation::{Quaternion, Vector, add_scaled, dot, inverse, log, product};
+use crate::numerics::rotation::{Quaternion, Vector, add_scaled, inverse, log, product};
 use crate::numerics::smoothing_spline::Smoothing;
 use crate::numerics::statistics::range;
 
@@ -72,8 +72,8 @@ pub(super) fn alignment(alignment: &Alignment, vectors: Vec<Range<usize>>) -> Al
     Alignment { vectors, smoothing, ..alignment.clone() }
 }
 
-/// Returns the scales of the DoFs in the comparison of [`integrated`] demonstrations: their ranges, and for a rotation its
-/// largest distance from the start, which depends on no frame.
+/// Returns the scales of the DoFs in the comparison of [`integrated`] demonstrations: their ranges, and for the components of a
+/// vector its largest distance from the start, which depends on no frame.
 pub(super) fn scales(demos: &[Demonstration], vectors: &[Range<usize>]) -> Vec<f64> {
     let largest = |of: &dyn Fn(ArrayView2<f64>) -> f64| {
         let most = demos.iter().map(|demo| of(demo.position())).fold(0.0, f64::max);
@@ -83,15 +83,14 @@ pub(super) fn scales(demos: &[Demonstration], vectors: &[Range<usize>]) -> Vec<f
         .map(|d| largest(&|position: ArrayView2<f64>| range(position.column(d))))
         .collect();
     for vector in vectors {
-        let distance = |position: ArrayView2<f64>| {
-            let of_row = |c: usize| -> f64 {
-                let off: Vector =
-                    std::array::from_fn(|i| position[[c, vector.start + i]] - position[[0, vector.start + i]]);
-                dot(off, off).sqrt()
-            };
-            (0..position.nrows()).map(of_row).fold(0.0, f64::max)
-        };
-        scales[vector.clone()].fill(largest(&distance));
+        scales[vector.clone()].fill(largest(&|position: ArrayView2<f64>| largest_distance(position, vector)));
     }
     scales
+}
+
+/// Returns the largest distance of a vector, given its columns of `position`, from its first value.
+pub(super) fn largest_distance(position: ArrayView2<f64>, vector: &Range<usize>) -> f64 {
+    let distance =
+        |row: ArrayView1<f64>| vector.clone().map(|d| (row[d] - position[[0, d]]).powi(2)).sum::<f64>().sqrt();
+    position.rows().into_iter().map(distance).fold(0.0, f64::max)
 }

@@ -10,7 +10,8 @@ use super::constants::Constants;
 use super::fit::labels_of;
 use super::mean_path::{Recording, mean_path};
 use super::options::{DofScaling, FitOptions};
-use crate::demonstration::{Demonstration, RotationColumns};
+use super::rotation_timing::largest_distance;
+use crate::demonstration::{Demonstration, RotationColumns, points};
 use crate::dynamics::mean_rotation::{MAX_CELLS, MeanRotation};
 use crate::error::{Error, Result, RotationError};
 use crate::model::Primitive;
@@ -39,6 +40,8 @@ pub(super) struct Residuals {
     dofs: Vec<usize>,
     /// Largest angle of each rotation from the start of a demonstration.
     ranges: Vec<f64>,
+    /// Point of each pose, and its largest distance from the start of a demonstration.
+    points: Vec<(Range<usize>, f64)>,
     /// Phases of the samples of each demonstration.
     phases: Vec<Vec<f64>>,
 }
@@ -106,18 +109,22 @@ impl Residuals {
         let findings =
             dofs.iter().zip(columns).filter_map(|(&dof, rotation)| far(&demos, dof, &names[rotation.column]));
         let findings = findings.collect();
-        Ok(Some(Self { demos, findings, names, units, means, dofs, ranges, phases }))
+        let range = |point: Range<usize>| {
+            let largest = demos.iter().map(|demo| largest_distance(demo.position(), &point)).fold(0.0, f64::max);
+            (point, largest)
+        };
+        let points = points(&units, columns).into_iter().map(range).collect();
+        Ok(Some(Self { demos, findings, names, units, means, dofs, ranges, points, phases }))
     }
 
-    /// Returns the DoFs of each rotation.
-    pub(super) fn vectors(&self) -> Vec<Range<usize>> {
-        self.dofs.iter().map(|&dof| dof..dof + 3).collect()
-    }
-
-    /// Replaces the ranges of residual rotations by the angles that the demonstrations turn.
+    /// Replaces the ranges of residual rotations by the angles that the demonstrations turn, and those of the coordinates of
+    /// a point by its distance, which depends on no frame.
     pub(super) fn set_ranges(&self, ranges: &mut [f64]) {
         for (&dof, &range) in self.dofs.iter().zip(&self.ranges) {
             ranges[dof..dof + 3].fill(range);
+        }
+        for (point, range) in &self.points {
+            ranges[point.clone()].fill(*range);
         }
     }
 
@@ -135,7 +142,7 @@ impl Residuals {
             }
             return Ok(scale.clone());
         }
-        let is_rotation = |d: usize| self.vectors().iter().any(|vector| vector.contains(&d));
+        let is_rotation = |d: usize| self.dofs.iter().any(|&dof| (dof..dof + 3).contains(&d));
         let others: Vec<usize> = (0..ranges.len()).filter(|&d| !is_rotation(d)).collect();
         let of_others: (Vec<f64>, Vec<String>) = others.iter().map(|&d| (ranges[d], units[d].clone())).unzip();
         let mut scale = vec![1.0; ranges.len()];
@@ -172,7 +179,7 @@ impl Residuals {
                 rows.iter().map(|row| (row[d] - mean).powi(2)).sum::<f64>()
             };
             of_others += others.iter().map(|&d| variance(d) / (scale[d] * scale[d])).sum::<f64>() / others.len() as f64;
-            let turned = self.vectors().into_iter().flatten().map(variance).sum::<f64>();
+            let turned = self.dofs.iter().flat_map(|&dof| dof..dof + 3).map(variance).sum::<f64>();
             of_rotations += turned / (3 * self.dofs.len()) as f64;
         }
         let ratio = (of_others / of_rotations).sqrt();
@@ -200,7 +207,8 @@ pub(super) fn about_means(demo: &Demonstration, coordinates: &Coordinates, phase
     in_dofs(demo, &clock, extent, &means, &plain, &dofs)
 }
 
-/// Returns the DoFs of each rotation of demonstrations, none without rotations.
+/// Returns the DoFs of each vector of demonstrations: of each rotation, and of the point of its pose. What is estimated of their
+/// components is shared, as single components depend on the frame. None without rotations.
 ///
 /// # Errors
 /// Rotations that differ between demonstrations.
@@ -209,8 +217,9 @@ pub(super) fn vectors_of(demos: &[Demonstration]) -> Result<Vec<Range<usize>>> {
     if let Some(m) = demos.iter().position(|demo| demo.rotations() != columns) {
         return Err(Error::Argument { name: "rotations", problem: "differ from those of demo 0" }.in_demo(m));
     }
-    let n = demos.first().map_or(0, Demonstration::n_coordinates);
-    Ok(layout(n, columns).1.into_iter().map(|dof| dof..dof + 3).collect())
+    let (names, units) = labels_of(demos)?;
+    let rotations = layout(names.len(), columns).1.into_iter().map(|dof| dof..dof + 3);
+    Ok(rotations.chain(points(&units, columns)).collect())
 }
 
 /// Returns the recorded rotations of a demonstration.

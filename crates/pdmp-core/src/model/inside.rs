@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use crate::demonstration::points;
 use crate::error::Result;
 use crate::model::conditions::Conditions;
 use crate::model::coordinates::Coordinates;
@@ -68,5 +69,12 @@ impl Primitive {
     /// Returns the first DoF of each rotation.
     pub(crate) fn rotation_dofs(&self) -> impl Iterator<Item = usize> + '_ {
         self.coordinates.iter().flat_map(|coordinates| coordinates.rotations().iter().map(|rotation| rotation.dof))
+    }
+
+    /// Returns the first DoF of each rotation, and of the point of each pose.
+    pub(crate) fn vector_dofs(&self) -> Vec<usize> {
+        let points =
+            self.coordinates.iter().flat_map(|coordinates| points(coordinates.units(), &coordinates.columns()));
+        self.rotation_dofs().chain(points.map(|point| point.start)).collect()
     }
 }

@@ -176,7 +176,8 @@ impl Primitive {
         &self.units
     }
 
-    /// Returns the largest range of each DoF within one demonstration (D,), in its unit.
+    /// Returns the largest range of each DoF within one demonstration (D,), in its unit. That of a rotation is its largest
+    /// angle from the start, that of the coordinates of its point the largest distance.
     pub fn ranges(&self) -> &[f64] {
         &self.ranges
     }

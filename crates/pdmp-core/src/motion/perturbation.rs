@@ -101,8 +101,8 @@ pub(crate) struct Perturbation {
     inverse_turn: Vec<F64x4>,
     /// Inverse of the range; zero for a stationary DoF, whose error does not stop the phase.
     inverse_range: Vec<F64x4>,
-    /// First DoF of each rotation.
-    rotations: Vec<usize>,
+    /// First DoF of each vector: a rotation, or the point of a pose.
+    vectors: Vec<usize>,
 }
 
 clone_in_place!(Perturbation {
@@ -120,7 +120,7 @@ clone_in_place!(Perturbation {
     turn,
     inverse_turn,
     inverse_range,
-    rotations,
+    vectors,
 });
 
 /// Returns the largest range of a DoF.
@@ -132,13 +132,12 @@ impl Perturbation {
     /// Returns no perturbation, with default gains for a primitive.
     pub(crate) fn new(primitive: &Primitive) -> Self {
         let (ranges, units, extent) = (primitive.ranges(), primitive.units(), primitive.canonical().extent());
-        let rotations: Vec<usize> = primitive.rotation_dofs().collect();
         let min_range = (MIN_RANGE_RATIO * largest_range(ranges)).max(MIN_RANGE);
         let inverse = |&range: &f64| if range > min_range { 1.0 / range } else { 0.0 };
         let zeros = vec![F64x4::ZERO; groups(ranges.len())];
         let inverse_range: Vec<f64> = ranges.iter().map(inverse).collect();
         // The error of a rotation is already by the shorter way.
-        let turns = |d: &usize| !rotations.iter().any(|&first| (first..first + 3).contains(d));
+        let turns = |d: &usize| !primitive.rotation_dofs().any(|first| (first..first + 3).contains(d));
         let turn_of_dof = |d| Some(d).filter(turns).and_then(|d| units.get(d)).and_then(|unit| turn_of(unit));
         let turn: Vec<f64> = (0..ranges.len()).map(|d| turn_of_dof(d).unwrap_or(0.0)).collect();
         let inverse_turn: Vec<f64> = turn.iter().map(|&turn| if turn > 0.0 { 1.0 / turn } else { 0.0 }).collect();
@@ -157,7 +156,7 @@ impl Perturbation {
             turn: pack(&turn),
             inverse_turn: pack(&inverse_turn),
             inverse_range: pack(&inverse_range),
-            rotations,
+            vectors: primitive.vector_dofs(),
         }
     }
 
@@ -234,7 +233,7 @@ impl Perturbation {
         for ((unexpected, &error), expected) in self.pull.iter_mut().zip(&self.error).zip(&self.expected_error) {
             *unexpected = error - expected.max(error.min(F64x4::ZERO)).min(error.max(F64x4::ZERO));
         }
-        self.expect_rotations();
+        self.expect_vectors();
         let mut squares = F64x4::ZERO;
         for (group, velocity) in self.terms.velocity.iter_mut().enumerate() {
             let unexpected = self.pull[group];
@@ -250,12 +249,12 @@ impl Perturbation {
         }
     }
 
-    /// Sets the unexpected error of each rotation: of its expected error, the part along its error counts.
-    fn expect_rotations(&mut self) {
-        let Self { pull, error, expected_error, rotations, .. } = self;
+    /// Sets the unexpected error of each vector: of its expected error, the part along its error counts.
+    fn expect_vectors(&mut self) {
+        let Self { pull, error, expected_error, vectors, .. } = self;
         let unexpected = bytemuck::cast_slice_mut::<F64x4, f64>(pull);
         let [error, expected] = [error, expected_error].map(|lanes| bytemuck::cast_slice::<F64x4, f64>(lanes));
-        for dof in rotations.iter().map(|&first| first..first + 3) {
+        for dof in vectors.iter().map(|&first| first..first + 3) {
             let products = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let (error, expected) = (&error[dof.clone()], &expected[dof.clone()]);
             let square = products(error, error);
@@ -315,7 +314,7 @@ impl Perturbation {
             turn: _,
             inverse_turn: _,
             inverse_range: _,
-            rotations: _,
+            vectors: _,
         } = self;
         for lanes in [velocity, acceleration, error, expected_error, pull] {
             visit(bytemuck::cast_slice_mut::<F64x4, f64>(lanes), quantity)?;

@@ -141,13 +141,24 @@ pub(crate) fn wobbles(n: usize, turns: f64, samples: usize) -> Vec<Array2<f64>> 
     (0..n).map(|_| one(std::array::from_fn(|_| random.between(-0.4, 0.4)))).collect()
 }
 
-/// Poses in another world and with another tool frame, world ⊗ q ⊗ tool, and with random signs. Positions stay.
+/// A pose, or a rotation alone, in another world and with another tool frame: world ⊗ q ⊗ tool, and the point turned by the
+/// world.
+pub(crate) fn in_frame(place: &[f64], world: Quaternion, tool: Quaternion) -> Vec<f64> {
+    let (point, q) = place.split_at(place.len() - 4);
+    let turned = times(times(world, std::array::from_fn(|i| q[i])), tool);
+    let point = (!point.is_empty()).then(|| apply(matrix(world), std::array::from_fn(|i| point[i])));
+    point.into_iter().flatten().chain(turned).collect()
+}
+
+/// Poses in another world and with another tool frame, whose quaternions have random signs.
 pub(crate) fn in_frames(poses: &Array2<f64>, world: Quaternion, tool: Quaternion, random: &mut Random) -> Array2<f64> {
     let (mut turned, column) = (poses.clone(), poses.ncols() - 4);
     for mut row in turned.rows_mut() {
-        let q = times(times(world, rotation(row.view(), column)), tool);
-        let sign = if random.next() < 0.5 { -1.0 } else { 1.0 };
-        row.slice_mut(s![column..]).assign(&Array1::from_vec(q.map(|x| sign * x).to_vec()));
+        let place = in_frame(&row.to_vec(), world, tool);
+        row.assign(&Array1::from_vec(place));
+        if random.next() < 0.5 {
+            row.slice_mut(s![column..]).mapv_inplace(|x| -x);
+        }
     }
     turned
 }
