@@ -10,9 +10,12 @@ use std::sync::Arc;
 
 use accepted::mostly_accepted;
 use common::*;
+use ndarray::Array2;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
-use pdmp_core::{Command, Conditions, Controller, Error, Kind, Model, Status};
+use pdmp_core::{
+    Command, Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Sampling, Status, fit,
+};
 use proptest::prelude::*;
 
 fn controller(model: &Arc<Model>) -> Controller {
@@ -426,6 +429,43 @@ fn rejected_perturbations_leave_the_state() {
     // A reset discards the perturbation.
     rejecting.reset(&Conditions::default()).unwrap();
     assert_eq!(rejecting.velocity(), controller(&REACH).velocity());
+}
+
+/// A DoF that rests in all demonstrations delays the end of a movement by no more than others when it was pushed away.
+#[test]
+fn disturbed_dof_at_rest_does_not_delay_the_end() {
+    let demos: Vec<Demonstration> = [0.8, 1.0, 1.3].map(reach_beside_rest).into();
+    let model = Arc::new(fit(&demos, &FitOptions::new(Kind::Discrete)).unwrap());
+    let end = |push: [f64; 2]| {
+        let mut controller = controller(&model);
+        let mut ticks = 0;
+        while controller.status() == Status::Working {
+            let pushed = [controller.position()[0] + push[0], controller.position()[1] + push[1]];
+            let command = if (300..350).contains(&ticks) { measured(&pushed) } else { Command::default() };
+            controller.step_with(&command).unwrap();
+            ticks += 1;
+            if ticks == 350 {
+                controller.release();
+            }
+            assert!(ticks < 20_000);
+        }
+        ticks
+    };
+    let [free, moving, resting] = [[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]].map(end);
+    assert!(resting <= moving && moving < free + 300, "{free} {moving} {resting}");
+    // A change of its goal is waited for, within the tolerance of this change.
+    let mut controller = controller(&model);
+    let goal = [controller.centre()[0], controller.centre()[1] + 0.01];
+    controller.set_goal(&goal).unwrap();
+    while controller.step().unwrap() == Status::Working {}
+    assert!((controller.position()[1] - goal[1]).abs() <= 0.005 * 0.01);
+}
+
+/// Returns a demonstration of a reach of given height beside a DoF at rest.
+fn reach_beside_rest(height: f64) -> Demonstration {
+    let position =
+        Array2::from_shape_fn((201, 2), |(c, d)| if d == 0 { height * minimum_jerk(c as f64 / 200.0) } else { 0.4 });
+    Demonstration::new(position, Sampling::Uniform { dt: 0.005 }).unwrap()
 }
 
 proptest! {

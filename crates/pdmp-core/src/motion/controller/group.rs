@@ -17,7 +17,7 @@ pub(super) struct Group {
     pub(super) z: F64x4,
     /// Displacement g − y₀ of the frame from start to goal; zero for a rhythmic movement.
     pub(super) displacement: F64x4,
-    /// Length that the tolerance of a settled movement is relative to: the larger of range and distance from the goal.
+    /// Length that the tolerance of a settled movement is relative to.
     pub(super) length: F64x4,
     /// Rounding error of the distance from the goal.
     pub(super) rounding: F64x4,
@@ -31,6 +31,14 @@ impl Group {
         let min_range = F64x4::splat(MIN_RANGE_RATIO * largest_range(ranges));
         let group = |range: &F64x4| Self { range: range.max(min_range), ..Self::default() };
         pack(ranges).iter().map(group).collect()
+    }
+
+    /// Returns the length that the tolerance is relative to: the larger of range and distance from the goal. A DoF that neither
+    /// moved in the demonstrations nor has to has no length of its own, and that of the largest range.
+    pub(super) fn length_at(&self, distance: F64x4, largest_range: f64) -> F64x4 {
+        let length = self.range.max(distance);
+        let least = F64x4::splat(MIN_RANGE_RATIO * largest_range);
+        length.simd_le(least).select(F64x4::splat(largest_range), length)
     }
 
     /// Visits the state, with the bounds of a quantity in units of a DoF and the largest distance from start to goal.

@@ -9,6 +9,7 @@ use super::step::first_element;
 use crate::model::Conditions;
 use crate::model::coordinates::Coordinates;
 use crate::motion::command::{Command, Coupling};
+use crate::motion::perturbation::largest_range;
 use crate::numerics::rotation::{Turning, Vector, dot, exp, inverse_jacobian, jacobian, log_near};
 use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, compute, unpack};
 use crate::numerics::state::clone_in_place;
@@ -255,6 +256,7 @@ impl Controller {
     /// Gives the three DoFs of each rotation the length of its distance from the goal, which depends on no frame.
     pub(super) fn share_lengths(&mut self) {
         let Self { primitive, groups, position, centre, .. } = self;
+        let largest = largest_range(primitive.ranges());
         for dof in primitive.rotation_dofs() {
             let at = |i: usize| place(dof + i);
             let off: [f64; 3] = std::array::from_fn(|i| {
@@ -265,8 +267,8 @@ impl Controller {
             let rounding = (0..3).map(|i| groups[at(i).0].rounding.as_array()[at(i).1]).fold(0.0f64, f64::max);
             for i in 0..3 {
                 let (group, lane) = at(i);
-                let range = groups[group].range.as_array()[lane];
-                groups[group].length.as_mut_array()[lane] = range.max(distance);
+                let length = groups[group].length_at(F64x4::splat(distance), largest);
+                groups[group].length.as_mut_array()[lane] = length.as_array()[lane];
                 groups[group].rounding.as_mut_array()[lane] = rounding;
             }
         }

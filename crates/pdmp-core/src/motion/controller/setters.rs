@@ -182,7 +182,8 @@ impl Controller {
     }
 
     /// Sets the tolerance of a settled movement, 0.005 by default, relative to the larger of two lengths of each DoF: its
-    /// largest demonstrated range, and its distance from the goal when this was last commanded.
+    /// largest demonstrated range, and its distance from the goal when this was last commanded. Where both are a millionth of
+    /// the largest range or less, it is relative to the largest range: a disturbed DoF at rest does not delay the end.
     ///
     /// Past the demonstrated end a movement is [`Status::Finished`] when it is within the tolerance of its goal and will stay
     /// there. The tolerance remains in force after [`Controller::reset`].

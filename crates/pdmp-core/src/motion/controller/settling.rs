@@ -3,6 +3,7 @@
 use super::group::ForcingSample;
 use super::{Controller, Status};
 use crate::dynamics::output_system::{Attractor, CubicSample, State};
+use crate::motion::perturbation::largest_range;
 use crate::numerics::simd::{F64x4, unpack};
 
 impl Controller {
@@ -11,10 +12,11 @@ impl Controller {
         let Attractor { alpha_z, beta_z } = self.primitive.attractor();
         // Per tick of length h the attractor moves by ωh of the distance, which rounding stops below about ε|y|/(ωh).
         let relative = 8.0 * f64::EPSILON * (1.0 + self.conditions.tau / ((alpha_z * beta_z).sqrt() * self.dt));
+        let largest = largest_range(self.primitive.ranges());
         let distances = self.centre.target().iter().zip(&self.position);
         for (group, (&centre, &position)) in self.groups.iter_mut().zip(distances) {
             group.rounding = centre.abs().max(position.abs()) * relative;
-            group.length = group.range.max((centre - position).abs());
+            group.length = group.length_at((centre - position).abs(), largest);
         }
         if self.pose.is_some() {
             self.share_lengths();
