@@ -18,6 +18,7 @@ from reproduction.torques import DT, TorqueControlled
 SOURCES = ["franka_tasks", "kuka_paths"]
 COLUMNS = ["x", "y", "z", "qa", "qb", "qc", "qd"]
 DURATION = 8.0  # s; the recordings of a Franka have a phase instead of the time
+SLOWER = 1.5  # at the recorded speed of a KUKA, the path leads the Panda's motors to their limits
 DOWNWARDS = (0.0, 1.0, 0.0, 0.0)  # orientation of the hand on the paths of a KUKA, which have none
 JOINTS = tuple(f"joint{k}" for k in range(1, 8))
 NEAR = {
@@ -45,7 +46,7 @@ def tasks() -> dict[str, list[pdmp.Demonstration]]:
                 # Half a turn of the base puts the paths in front of the Panda.
                 point = demo.position * [-1.0, -1.0, 1.0]
                 pose = np.hstack([point, np.tile(DOWNWARDS, (demo.n_samples, 1))])
-                recorded = pdmp.Demonstration(pose, time=demo.time, rotations={3: "wxyz"})
+                recorded = pdmp.Demonstration(pose, time=SLOWER * demo.time, rotations={3: "wxyz"})
                 found["sink"].append(recorded)
     return dict(found)
 

@@ -22,10 +22,10 @@ controller.
 
 The primitive is fitted to the recorded tool poses of a task, and moves as the third of them. The
 tasks `openbox` and `pouring` were recorded on a Franka, nine poses each, with a phase instead of
-the time; they take {duration:g} s here. `sink` was recorded on a KUKA, eleven paths in time without
-orientations, on which the hand points downwards. In the last two columns, a person holds the elbow
-from {held[0]:g} to {held[1]:g} s, modelled by a stiff spring. Without `measured=`, the commanded
-pose moves on meanwhile, and the released tool rushes after it.
+the time; they take {duration:g} s here. `sink` was recorded on a KUKA, eleven paths without
+orientations, on which the hand points downwards; it is {slower:g} times slower here. In the last
+two columns, a person holds the elbow from {held[0]:g} to {held[1]:g} s, modelled by a stiff spring.
+Without `measured=`, the commanded pose moves on meanwhile, and the released tool rushes after it.
 """
 BOX = """\
 ## A box between the hands of Baxter
@@ -130,7 +130,7 @@ def text(
     spread : tuple of float
         Largest deviation of the demonstrated relative poses from their mean [m, rad].
     """
-    parts = [INTRODUCTION.format(duration=panda.DURATION, held=panda.HELD)]
+    parts = [INTRODUCTION.format(duration=panda.DURATION, slower=panda.SLOWER, held=panda.HELD)]
     for task, records in pandas.items():
         parts += [f"Task `{task}`:\n", of_panda(records), ""]
     parts += [
