@@ -32,7 +32,7 @@ REST = 0.5  # s, after the movement
 
 
 def tasks() -> dict[str, list[pdmp.Demonstration]]:
-    """Reads the demonstrations of each task, tool poses (T, 7), from the recordings that are there."""
+    """Reads the demonstrations of each task for which there are recordings, tool poses (T, 7)."""
     found = defaultdict(list)
     franka, kuka = SOURCES
     if is_available(franka):
