@@ -167,7 +167,7 @@ def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
 def movement_panels(
     model: Model, titles: Sequence[str], ax: Axes | ArrayLike | None
 ) -> list[list[Axes]]:
-    """Returns, per title, a column of panels for `draw_movement`.
+    """Returns a column of panels for `draw_movement` per title.
 
     With two degrees of freedom, the first panel is for the path. The others are for each degree of
     freedom over time, in a grid if one column has more than four.
