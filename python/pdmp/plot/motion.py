@@ -113,4 +113,4 @@ def _draw_limits(columns: NDArray[Any], limits: Limits, n_dofs: int) -> None:
                 raise ValueError(f"limits of {len(bound)} degrees of freedom, expected {n_dofs}")
             for axes, value in zip(column, np.broadcast_to(bound, n_dofs), strict=False):
                 if np.isfinite(value):
-                    axes.axhline(value, color="black", linewidth=0.8, linestyle="--")
+                    axes.axhline(value, color=axes.title.get_color(), linewidth=0.8, linestyle="--")
