@@ -168,7 +168,7 @@ fn largest_noise(model: &pdmp_core::Model) -> Option<(String, String)> {
 fn three_digits(value: f64) -> String {
     let text = format!("{value:.2e}");
     let rounded = text.parse::<f64>().unwrap_or(value);
-    if (1e-3..1e6).contains(&rounded.abs()) { format!("{rounded}") } else { text }
+    if (1e-4..1e6).contains(&rounded.abs()) { format!("{rounded}") } else { text }
 }
 
 /// Returns the labels of each context column, or the range of its numbers.
