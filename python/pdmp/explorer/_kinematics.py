@@ -209,7 +209,7 @@ def _interpolate(
 
 
 def _nodes(base: float, turn: float | str | None) -> list[Array]:
-    """Returns as many values of a joint or rotation as it has factors."""
+    """Returns values of a joint or rotation, one for each of its factors."""
     if turn is None:
         return [np.array([base + share * max(abs(base), 1.0)]) for share in (0.0, 1.0)]
     if isinstance(turn, str):
