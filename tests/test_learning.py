@@ -313,7 +313,7 @@ def test_noise_that_is_large_is_reported() -> None:
 
 
 def test_noise_of_a_joint_that_hardly_moves_is_not_reported() -> None:
-    """Noise of a joint whose range is a ten-thousandth of another one of the same unit is silent."""
+    """Noise of a joint with a ten-thousandth of the range of another one is silent."""
     random = np.random.default_rng(0)
     clean = _reach()[:, :1] * [1, 1e-4]
 
