@@ -14,7 +14,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import Matern
 
 import pdmp
-from pdmp.plot.canvas import MARKERS, PALETTE, ensure_figure, label_axes
+from pdmp.plot.canvas import MARKERS, PALETTE, label_axes, new_figure
 from peers.factors import library
 from peers.regression import LENGTH, NOISE, samples
 
@@ -99,7 +99,7 @@ def main() -> None:
         "pdmp, all factors": every,
         "numpy, all factors": lapack,
     }
-    figure = ensure_figure(None, 9, 4.2)
+    figure = new_figure(9, 4.2)
     left, right = figure.subplots(1, 2)
     title = "Gaussian process, Matérn-5/2, three outputs"
     panel(left, title, processes, SIZES, "samples C")

@@ -21,7 +21,7 @@ from pdmp import plot
 from pdmp._markdown import markdown_table
 from pdmp.cli.progress import progress
 from pdmp.datasets import handwriting
-from pdmp.plot.canvas import BLUE, GREY, ORANGE, draw_movement, legend, movement_panels
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, draw_movement, figure_of, legend, movement_panels
 from reproduction import command
 from reproduction.metrics import reproduction_error
 from reproduction.section import Section
@@ -158,7 +158,7 @@ def control(model: pdmp.Model, conditions: pdmp.Conditions, command: Mapping[str
 
 def draw_control(model: pdmp.Model, conditions: pdmp.Conditions, runs: Mapping[str, Run]) -> Figure:
     """Draws the movement under each command."""
-    figure, columns = movement_panels(model, list(runs), None)
+    columns = movement_panels(model, list(runs), None)
     longest = DT * max(len(run.ticks) for run in runs.values())
     plain = model.rollout(conditions, dt=DT, duration=longest)
     point = {"color": ORANGE, "marker": "o", "linestyle": "", "label": "command"}
@@ -170,8 +170,8 @@ def draw_control(model: pdmp.Model, conditions: pdmp.Conditions, runs: Mapping[s
         )
         draw_movement(panels, time, run.position, color=BLUE, linewidth=1.6, label="commanded")
         draw_movement(panels, time[at], run.position[at], **point)
-    legend(figure, columns[0][0])
-    return figure
+    legend(columns[0][0])
+    return figure_of(columns[0])
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pdmp.plot.canvas import ensure_figure
+from pdmp.plot.canvas import new_figure
 from reproduction.baxter import engine
 from reproduction.robot import Robot
 from reproduction.section import Section
@@ -60,7 +60,7 @@ def strip(rows: Mapping[str, tuple[Robot, Sequence[float]]], shot: CameraView) -
         MuJoCo cannot render.
     """
     n_columns = max(len(times) for _, times in rows.values())
-    figure = ensure_figure(None, 2.1 * n_columns, 2.2 * len(rows))
+    figure = new_figure(2.1 * n_columns, 2.2 * len(rows))
     grid = figure.subplots(len(rows), n_columns, squeeze=False)
     for row, (name, (robot, times)) in zip(grid, rows.items(), strict=True):
         for axes, time, picture in zip(row, times, _pictures(robot, times, shot), strict=True):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import pdmp
 from pdmp._markdown import markdown_table
-from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, ensure_figure, label_axes, legend
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, label_axes, legend, new_figure
 from pdmp.preprocessing import resample
 from reproduction import bounded, paths
 from reproduction.loop import TAU, NewGoal, reach_over
@@ -201,7 +201,7 @@ def figure_4(seed: int = SEED) -> Section:
 
 def draw_errors(errors: Errors) -> Figure:
     """Draws E over J."""
-    figure = ensure_figure(None, 5.2, 3.8)
+    figure = new_figure(5.2, 3.8)
     axes = figure.subplots()
     n_styles = np.arange(1, len(errors.predicted) + 1)
     for rows, color, label in (
@@ -212,7 +212,7 @@ def draw_errors(errors: Errors) -> Figure:
         axes.errorbar(n_styles, mean, spread, color=color, marker="o", capsize=3, label=label)
     label_axes(axes, "number of styles J", "E [rad²]", "prediction error on new heights")
     axes.set_ylim(bottom=0)
-    legend(figure, axes)
+    legend(axes)
     return figure
 
 
@@ -220,7 +220,7 @@ def draw_paths(
     reaching: Reaching, robots: dict[float, Robot], moved: dict[float, Robot], command: NewGoal
 ) -> Figure:
     """Draws the predicted and the demonstrated path of the hand from the side."""
-    figure = ensure_figure(None, 9.5, 4.6)
+    figure = new_figure(9.5, 4.6)
     panels = figure.subplots(1, len(robots), sharey=True)
     for axes, height in zip(panels, robots, strict=True):
         paths.draw_boxes(axes, reaching, height)
@@ -236,5 +236,5 @@ def draw_paths(
         axes.plot(distance, hand_height, "*", color=PALETTE[2], markersize=12, label="new goal")
         paths.label_side_view(axes, pile(height))
     panels[0].set_ylim(bottom=0)
-    legend(figure, panels[0])
+    legend(panels[0])
     return figure

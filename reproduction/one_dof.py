@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import pdmp
 from pdmp._markdown import markdown_table
-from pdmp.plot.canvas import BLUE, GREY, ORANGE, colormap, ensure_figure, label_axes, legend
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, colormap, label_axes, legend, new_figure
 from reproduction.metrics import reproduction_error
 from reproduction.section import SEED, Section
 
@@ -118,7 +118,7 @@ def figure_2(seed: int = SEED) -> Section:
 
 def draw(examples: Sequence[Example]) -> Figure:
     """Draws demonstrations, reproductions with other goals and tau, and blended styles."""
-    figure = ensure_figure(None, 12.0, 6.8)
+    figure = new_figure(12.0, 6.8)
     grid = figure.subplots(len(examples), 3)
     for row, example in zip(grid, examples, strict=True):
         model = example.model
@@ -137,7 +137,7 @@ def draw(examples: Sequence[Example]) -> Figure:
         titles = ("demonstrations", "two styles, goals, time constants", "from s1 to s2")
         for axes, title in zip(row, titles, strict=True):
             label_axes(axes, "time [s]", "position [–]", f"{example.title}: {title}")
-    legend(figure, grid[0, 1])
+    legend(grid[0, 1])
     return figure
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp.plot.canvas import GREY, PALETTE, ensure_figure, label_axes, legend
+from pdmp.plot.canvas import GREY, PALETTE, label_axes, legend, new_figure
 from reproduction.human import BOX
 from reproduction.reaching import NAMES, Reaching
 from reproduction.robot import SHADES, Robot, boxes
@@ -54,7 +54,7 @@ def joints(robots: Mapping[str, Robot], until: float) -> Figure:
     until : float
         End of the drawn time [s].
     """
-    figure = ensure_figure(None, 7.5, 8.5)
+    figure = new_figure(7.5, 8.5)
     panels = figure.subplots(len(NAMES) + 1, 1, sharex=True)
     for axes, name in zip(panels, NAMES, strict=False):
         label_axes(axes, "", f"{name} [rad]")
@@ -66,5 +66,5 @@ def joints(robots: Mapping[str, Robot], until: float) -> Figure:
             axes.plot(time, command, color=GREY, linewidth=3, label="commanded")
             axes.plot(time, angle, color=color, linewidth=1.2, label=name)
         panels[-1].plot(time, 1e3 * np.abs(done - commanded).max(axis=1), color=color, linewidth=1)
-    legend(figure, panels[0])
+    legend(panels[0])
     return figure

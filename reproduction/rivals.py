@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import pdmp
 from pdmp._markdown import markdown_table
-from pdmp.plot.canvas import BLUE, GREY, ORANGE, ensure_figure, label_axes, legend
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, label_axes, legend, new_figure
 from reproduction.heights import (
     N_SAMPLES,
     TESTED,
@@ -225,7 +225,7 @@ def comparison(seed: int = SEED) -> Section:
 
 def draw_locked(trials: dict[str, TrialResult]) -> Figure:
     """Draws commanded and measured elbow angle during the lock and after it."""
-    figure = ensure_figure(None, 9.5, 3.8)
+    figure = new_figure(9.5, 3.8)
     panels = figure.subplots(1, len(trials), sharey=True)
     for axes, (name, trial) in zip(panels, trials.items(), strict=True):
         commanded, done = (rows[:, LOCKED_JOINT] for rows in trial.locked.log.rows())
@@ -237,7 +237,7 @@ def draw_locked(trials: dict[str, TrialResult]) -> Figure:
         axes.plot(time[within], commanded[within], color=GREY, linewidth=3, label="commanded")
         axes.plot(time[within], done[within], color=BLUE, label="measured")
         label_axes(axes, "time [s]", "q4 [rad]", name)
-    legend(figure, panels[0])
+    legend(panels[0])
     return figure
 
 

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
-from pdmp.plot.canvas import ensure_figure
+from pdmp.plot.canvas import new_figure
 from reproduction.section import SEED, Section
 
 Folder: TypeAlias = str | PathLike[str]
@@ -59,7 +59,7 @@ def reproduce(
         raise ValueError(f'recordings: only "fig5" learns from them, not "{figure}"')
     if recordings is not None and not Path(recordings).is_dir():
         raise ValueError(f"recordings: {recordings} is not a folder")
-    ensure_figure(None, 1, 1)  # raises an error at once without matplotlib
+    new_figure(1, 1)  # raises an error at once without matplotlib
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     reports = []

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import pdmp
 from pdmp._markdown import markdown_table
-from pdmp.plot.canvas import GREY, PALETTE, ensure_figure
+from pdmp.plot.canvas import GREY, PALETTE, new_figure
 from reproduction import film, paths
 from reproduction.loop import reach_over
 from reproduction.reaching import CONSTANTS, HEIGHTS, Reaching, demonstrate, height_of
@@ -105,7 +105,7 @@ def figure_3(seed: int = SEED) -> Section:
 
 def draw_paths(model: pdmp.Model, reaching: Reaching, robots: dict[str, Robot]) -> Figure:
     """Draws the path of the hand from the side, for several styles and several goals."""
-    figure = ensure_figure(None, 9.5, 4.2)
+    figure = new_figure(9.5, 4.2)
     styles, goal_panel = figure.subplots(1, 2, sharey=True)
     tallest = max(HEIGHTS)
     for axes in (styles, goal_panel):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import pdmp
 from pdmp._markdown import markdown_table
 from pdmp.io import read_csv
-from pdmp.plot.canvas import BLUE, ORANGE, ensure_figure, label_axes
+from pdmp.plot.canvas import BLUE, ORANGE, label_axes, new_figure
 from pdmp.preprocessing import cycles
 from reproduction import film
 from reproduction.robot import Robot
@@ -161,7 +161,7 @@ def draw(
     """Draws the joints of one arm about each switch."""
     position = np.array(result.position)
     interval = len(position) * DT / len(commands)
-    figure = ensure_figure(None, 11.0, 7.0)
+    figure = new_figure(11.0, 7.0)
     panels = figure.subplots(len(names), len(commands) - 1, sharey="row", sharex="col")
     for column, switch in enumerate(commands[1:], start=1):
         at = column * interval

@@ -305,10 +305,34 @@ def test_wrong_arguments_are_named(given: dict[str, Any], message: str, reach: p
         reach.explorer(**given)
 
 
-def test_kinematics_of_poses_are_refused() -> None:
-    """A stick figure needs joint positions."""
-    with pytest.raises(ValueError, match="do not apply to a model with rotations"):
-        poses("wxyz", "body").explorer(kinematics=lambda q: [q[:3]])
+def gripper(order: str) -> Callable[[Array], Array]:
+    """Returns the points of two bodies with the rotations of `poses`."""
+    columns = [[0, 1, 2, 3], [3, 0, 1, 2]][order == "xyzw"]
+
+    def points(q: Array) -> Array:
+        tip = q[4:7] + rotated(q[columns], np.array([0.0, 0.02, 0.1]))
+        return np.array([q[4:7], tip, q[4:7] + rotated(q[7:], np.array([0.1, 0.0, 0.0]))])
+
+    return points
+
+
+def rotated(q: Array, v: Array) -> Array:
+    """Returns a vector, rotated by a unit quaternion w, x, y, z."""
+    return times(times(q, np.concatenate([[0.0], v])), q * [1, -1, -1, -1])[1:]
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_points_of_bodies_that_rotate_are_exact_everywhere(order: str) -> None:
+    """Points of rotated bodies are exact for any rotation, in either order of components."""
+    figure = stick_figure(poses(order, "body"), gripper(order), None)
+    joints = [[4, 5, 6], [0, 4, 5, 6], [4, 5, 6, 7]]
+    assert [point["dofs"] for point in figure["points"]] == joints
+    rng = np.random.default_rng(0)
+    for q in rng.normal(size=(20, 11)):
+        for part in (q[:4], q[7:]):
+            part /= np.linalg.norm(part)
+        found = [evaluate(point, q) for point in figure["points"]]
+        assert np.abs(found - gripper(order)(q)).max() < 1e-12
 
 
 def test_points_of_many_joints_are_refused() -> None:
@@ -556,6 +580,16 @@ def test_the_stick_figure_follows_the_movement(
             f" explorer.movement().position.map((curve) => curve[{k}])]"
         )
         assert_close(points, arm(np.array(position)))
+
+
+def test_the_stick_figure_follows_a_pose(page: Callable[..., Browser]) -> None:
+    """Points of a rotated body on the screen are those of the kinematics."""
+    opened = page(poses("xyzw", "body"), kinematics=gripper("xyzw"))
+    points, position = opened.evaluate(
+        "[explorer.followers[0].pose(explorer.movement(), 0.35),"
+        " explorer.movement().position.map((curve) => curve[70])]"
+    )
+    assert_close(points, gripper("xyzw")(np.array(position)))
 
 
 def test_playback_draws_sixty_frames_a_second(

@@ -47,7 +47,7 @@ KINDS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], slice, str]] = {
         slice(0, 5),
         r'"y0" increases by exactly 1 per sample in every demonstration',
     ),
-    "turned": (lambda y: y + 2 * np.pi, slice(3, 4), r'demo 3: "y0" lies 1 full turns of 6.283'),
+    "turned": (lambda y: y + 2 * np.pi, slice(3, 4), r'demo 3: "y0" lies 1 full turn of 6.283'),
 }
 
 

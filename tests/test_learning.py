@@ -1,6 +1,7 @@
 """Learning, compared with numpy and scipy, and on human handwriting."""
 
 import inspect
+import warnings
 from typing import Any
 
 import numpy as np
@@ -308,7 +309,23 @@ def test_noise_that_is_large_is_reported() -> None:
     with pytest.warns(UserWarning, match=r'"y0" has measurement noise of standard deviation 0\.'):
         pdmp.fit([clean + 0.1 * random.normal(size=clean.shape) for _ in range(10)], dt=0.01)
     model = pdmp.fit([clean + 0.005 * random.normal(size=clean.shape) for _ in range(10)], dt=0.01)
-    assert "measurement noise 4." in repr(model) or "measurement noise 5." in repr(model)
+    assert "measurement noise 0.004" in repr(model) or "measurement noise 0.005" in repr(model)
+
+
+def test_noise_of_a_joint_that_hardly_moves_is_not_reported() -> None:
+    """Noise of a joint with a ten-thousandth of the range of another one is silent."""
+    random = np.random.default_rng(0)
+    clean = _reach()[:, :1] * [1, 1e-4]
+
+    def fit(units: list[str]) -> None:
+        noisy = [clean + [0, 1e-5] * random.normal(size=clean.shape) for _ in range(10)]
+        pdmp.fit([Demonstration(y, dt=0.01, units=units) for y in noisy])
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit(["rad", "rad"])
+    with pytest.warns(UserWarning, match=r'"y1" has measurement noise of standard deviation 0\.'):
+        fit(["m", "rad"])
 
 
 def test_small_degrees_of_freedom_that_are_left_out_are_reported() -> None:
@@ -322,5 +339,8 @@ def test_small_degrees_of_freedom_that_are_left_out_are_reported() -> None:
     ]
     with pytest.warns(UserWarning, match=r'n_styles = 1 leaves out \d+ % of "y1"'):
         pdmp.fit(demos, dt=0.01, n_styles=1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pdmp.fit(demos, dt=0.01, n_styles=1, dof_scale="range")  # scaled already
     made = pdmp.fit(demos, dt=0.01)
     assert made.n_styles == 2

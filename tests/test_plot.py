@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cycler import cycler
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 import pdmp
@@ -163,11 +165,79 @@ def test_held_out_movements_have_a_column_per_reach(evaluation: Evaluation) -> N
         assert (len(axes.lines), len(axes.collections)) == (2, 1)
 
 
-def test_given_figure_is_drawn_on(model: pdmp.Model) -> None:
-    """A given figure is drawn on and returned."""
+def test_given_axes_are_drawn_into(model: pdmp.Model) -> None:
+    """Given panels are drawn into row by row, and their figure is returned."""
     figure = Figure()
-    assert plot.singular_values(model, figure=figure) is figure
-    assert figure.axes
+    axes = figure.subplots()
+    assert plot.singular_values(model, ax=axes) is figure
+    assert axes.lines
+    assert figure.axes == [axes]
+    grid = Figure().subplots(3, 2)
+    plot.demonstrations(model, reaches(), labels=["b", "b", "a", "a", "a"], ax=grid)
+    assert [each.get_title() for each in grid[0]] == ["b", "a"]
+    assert [len(each.lines) for each in grid[:, 1]] == [6, 6, 6]
+    assert not grid[0, 0].figure.legends
+    assert grid[0, 0].get_legend() is not None
+
+
+def test_panels_are_made_in_the_place_of_one_axes(
+    model: pdmp.Model, rhythmic: pdmp.Model, evaluation: Evaluation
+) -> None:
+    """Each figure of several panels fits into one Axes, also that of a part of a figure."""
+    part = Figure(layout="constrained").subfigures(1, 2)[0]
+    for draw in (
+        lambda ax: plot.demonstrations(model, reaches(), ax=ax),
+        lambda ax: plot.fan(model, model.conditions(0), model.conditions(4), ax=ax),
+        lambda ax: plot.motion(model.rollout(), ax=ax),
+        lambda ax: plot.cut_off(reaches()[0], ax=ax),
+        lambda ax: plot.variation(reaches(), ax=ax),
+        lambda ax: plot.phase_portrait(rhythmic, ax=ax),
+        lambda ax: plot.prediction_error(evaluation, ax=ax),
+        lambda ax: plot.held_out(evaluation, "PDMP, J = 2", ax=ax),
+        lambda ax: plot.styles(model, ax=ax),
+    ):
+        part.clear()
+        left, right = part.subplots(1, 2)
+        figure = draw(right)
+        figure.canvas.draw()
+        assert figure is part.figure
+        assert not left.has_data()
+        boxes = [axes.get_position() for axes in part.axes if axes.has_data()]
+        assert boxes
+        assert all(box.x0 > left.get_position().x1 for box in boxes)
+
+
+def test_axes_of_another_number_are_rejected(model: pdmp.Model) -> None:
+    """The error has the rows and columns that are expected."""
+    with pytest.raises(ValueError, match="ax has 4 panels, expected 6: 2 rows of 3; or pass one"):
+        plot.motion(model.rollout(), ax=Figure().subplots(2, 2))
+    with pytest.raises(ValueError, match=r"not one of pyplot.subplots: pass 2 Axes, 1 rows of 2"):
+        plot.variation(reaches(), ax=Figure().add_axes((0, 0, 1, 1)))
+    wrong: Any = Figure()
+    with pytest.raises(TypeError, match="ax: expected Axes of matplotlib, got Figure"):
+        plot.styles(model, ax=wrong)
+
+
+def test_sizes_and_colours_follow_matplotlib(model: pdmp.Model) -> None:
+    """Changed rcParams set size, resolution, colours and colour map."""
+    usual = plot.singular_values(model)
+    with rc_context(
+        {
+            "figure.figsize": (3.2, 2.4),
+            "figure.dpi": 50,
+            "axes.prop_cycle": cycler(color=["red", "lime"]),
+            "image.cmap": "magma",
+        }
+    ):
+        changed = plot.singular_values(model)
+        (axes,) = changed.axes
+        styles = plot.styles(model).axes[0]
+    assert usual.dpi == 150
+    assert changed.dpi == 50
+    assert changed.get_size_inches().tolist() == (usual.get_size_inches() / 2).tolist()
+    assert axes.patches[0].get_facecolor() == (1, 0, 0, 1)
+    assert axes.lines[0].get_color() == "lime"
+    assert styles.collections[0].get_cmap().name == "magma"
 
 
 def test_saved_figure_is_a_png(model: pdmp.Model, tmp_path: Path) -> None:
@@ -335,12 +405,3 @@ def test_figures_show_themselves_once(model: pdmp.Model) -> None:
     figure = plot.singular_values(model)
     assert figure._repr_png_().startswith(b"\x89PNG")
     assert not plt.get_fignums()
-
-
-def test_figures_take_a_place_in_others(model: pdmp.Model) -> None:
-    """A part of a figure is drawn on as a figure."""
-    figure = Figure(layout="constrained")
-    left, right = figure.subfigures(1, 2)
-    assert plot.singular_values(model, figure=left) is left
-    plot.variation(reaches(), figure=right)
-    assert len(figure.axes) == 3

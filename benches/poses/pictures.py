@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pdmp.plot.canvas import ensure_figure, save
+from pdmp.plot.canvas import new_figure, save
 from reproduction.baxter import engine
 
 WIDTH, HEIGHT = 400, 360  # pixels
@@ -45,7 +45,7 @@ def strip(
     camera.azimuth, camera.distance, camera.lookat[:] = view
     camera.elevation = -18
     option.geomgroup[:], option.sitegroup[:] = [0, 1, 0, 0, 0, 0], 0
-    figure = ensure_figure(None, 2.3 * n_frames, 2.3)
+    figure = new_figure(2.3 * n_frames, 2.3)
     ticks = np.linspace(0, len(states) - 1, n_frames).round().astype(int)
     for axes, tick in zip(figure.subplots(1, n_frames), ticks, strict=True):
         data.qpos[:] = states[tick]

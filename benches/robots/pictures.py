@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import pdmp
-from pdmp.plot.canvas import BLUE, GREY, ORANGE, ensure_figure, label_axes, legend, save
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, label_axes, legend, new_figure, save
 from pdmp.robots import REGISTRY
 from reproduction.torques import DT
 
@@ -20,7 +20,7 @@ N_SECONDS = 2.5
 
 def draw(path: Path) -> None:
     """Draws position, velocity and acceleration of two joints of a Panda."""
-    figure = ensure_figure(None, 7.6, 6.2)
+    figure = new_figure(7.6, 6.2)
     grid = figure.subplots(3, len(JOINTS), sharex=True)
     limits = REGISTRY["panda"].limits(JOINTS)
     lines = {
@@ -46,7 +46,7 @@ def draw(path: Path) -> None:
         axes.set_title(joint)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
-    legend(figure, grid[0, 0])
+    legend(grid[0, 0])
     save(figure, path)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import pdmp
 from pdmp.datasets import handwriting
-from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, ensure_figure, label_axes, legend, save
+from pdmp.plot.canvas import BLUE, GREY, ORANGE, PALETTE, label_axes, legend, new_figure, save
 
 DT = 0.001  # s
 TRANSPORTS = ("learnt", "immediate")
@@ -31,7 +31,7 @@ def draw(folder: Path) -> None:
 
 def moved_goals(path: Path) -> None:
     """Draws reaches to goals nearer, farther and moved on the way, for both transports."""
-    figure = ensure_figure(None, 6.8, 4.2)
+    figure = new_figure(6.8, 4.2)
     grid = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[1.4, 1])
     cases = {
         "demonstrated": (GREY, 0.3, 0.3),
@@ -52,7 +52,7 @@ def moved_goals(path: Path) -> None:
             upper.plot(time, position, color=color, label=label)
             lower.plot(time, acceleration, color=color, label=label)
             upper.plot(1.4, moved, "<", color=color, markersize=5, clip_on=False)
-    legend(figure, grid[0, 0])
+    legend(grid[0, 0])
     save(figure, path)
 
 
@@ -70,7 +70,7 @@ def goal_moved(model: pdmp.Model, goal: float, moved: float) -> tuple[np.ndarray
 
 def moved_writing(path: Path) -> None:
     """Draws a handwritten shape whose goal moves half way, for both transports."""
-    figure = ensure_figure(None, 6.8, 4.6)
+    figure = new_figure(6.8, 4.6)
     grid = figure.subplots(2, 2, sharex="row", sharey="row", height_ratios=[1.6, 1])
     demos = list(handwriting()[WRITTEN])
     for (upper, lower), transport in zip(grid.T, TRANSPORTS, strict=True):
@@ -101,13 +101,13 @@ def moved_writing(path: Path) -> None:
         lower.axvline(duration, color="black", linewidth=0.6)
     grid[0, 0].set_ylabel("y [mm]")
     grid[1, 0].set_ylabel("y [mm]")
-    legend(figure, grid[0, 0])
+    legend(grid[0, 0])
     save(figure, path)
 
 
 def two_ends(path: Path) -> None:
     """Draws the distance from the goal at the ends of two recordings."""
-    figure = ensure_figure(None, 7, 3)
+    figure = new_figure(7, 3)
     grid = figure.subplots(1, 2, sharex=True, sharey=True)
     shapes = handwriting()
     for axes, (title, (shape, m)) in zip(grid, ENDS.items(), strict=True):
@@ -139,13 +139,13 @@ def two_ends(path: Path) -> None:
     grid[0].set_ylabel("distance from the goal\n[% of the range]")
     grid[0].set_xlim(0.85, 1.8)
     grid[0].set_ylim(-0.15, 9)
-    legend(figure, grid[0])
+    legend(grid[0])
     save(figure, path)
 
 
 def perturbed(path: Path) -> None:
     """Draws an arm that is held at the elbow and released, and one that sags."""
-    figure = ensure_figure(None, 6.8, 4.1)
+    figure = new_figure(6.8, 4.1)
     grid = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[2, 1])
     s = np.linspace(0, 1, 201)
     reach = 1.2 * s**3 * (10 - 15 * s + 6 * s**2)
@@ -170,7 +170,7 @@ def perturbed(path: Path) -> None:
             for axes in (upper, lower):
                 axes.axvspan(*held, color=GREY, alpha=0.3, linewidth=0)
             upper.text(sum(held) / 2, 0.02, "held", ha="center", va="bottom")
-    legend(figure, grid[0, 0])
+    legend(grid[0, 0])
     save(figure, path)
 
 

@@ -75,7 +75,7 @@ class Thumbnails(SphinxDirective):
             title, text = page.read_text(encoding="utf-8").split("\n\n")[:2]
             title = title.removeprefix("# ")
             image = f"![{title}](/{FOLDER}/{page.stem}.png){{width=260px}}"
-            rows.append(f"| {image} | **[{title}]({page.name})**<br>{text} |")
+            rows.append(f"| {image} | **[{title}]({page.name})**<br>{' '.join(text.split())} |")
         lines = ["| | |", "|---|---|", *rows]
         table = nodes.container(classes=["thumbnails"])
         self.state.nested_parse(StringList(lines, source=self.env.docname), 0, table)

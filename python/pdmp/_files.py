@@ -2,8 +2,6 @@
 
 import errno
 import os
-import shutil
-import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,6 +35,9 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield draft
         if target.exists():
+            # Imported here, since `import pdmp` need not wait for it.
+            import shutil
+
             shutil.copymode(target, draft)
         os.replace(draft, target)
     except OSError as error:
@@ -53,6 +54,9 @@ def new_folder(path: Path) -> Iterator[Path]:
 
     The folder of `path` must exist, and `path` must not. After an error nothing remains.
     """
+    # Imported here, since `import pdmp` need not wait for it.
+    import tempfile
+
     check_folder(path)
     if path.exists():
         raise FileExistsError(errno.EEXIST, "exists; name a new folder", str(path))

@@ -1371,9 +1371,10 @@ class Model:
         limits : Limits, optional
             Limits of position, velocity and acceleration to draw and to compare the movement with.
         kinematics : callable, optional
-            Forward kinematics of a stick figure: points (P, 2) or (P, 3) at a position (D,). Each point may depend on at
-            most eight degrees of freedom, on each as a + b·cos q + c·sin q, as for revolute joints in rad or degrees, or,
-            in a unit of length, as a + b·q. The page then computes the points exactly.
+            Forward kinematics of a stick figure: points (P, 2) or (P, 3) at a position (n,) with the columns of a
+            demonstration. Each point may depend on at most eight degrees of freedom, on each as a + b·cos q + c·sin q, as
+            for revolute joints in rad or degrees, or, in a unit of length, as a + b·q; and linearly on the matrix of a
+            rotation, which counts three. The page then computes the points exactly.
         links : sequence of (int, int), optional
             Pairs of points to connect; by default each with the next one.
         dofs : sequence of str or int, optional
@@ -1653,7 +1654,8 @@ class Conditions:
     Parameters
     ----------
     style : array_like, (J,), optional
-        Style parameter s.
+        Style parameter s. ``style=model.styles[m]`` alone keeps start, goal and duration of the nominal demonstration;
+        ``model.conditions(m)`` has all of demonstration m.
     goal : array_like, (D,), optional
         Goal g in the unit of each degree of freedom; discrete.
     start : array_like, (D,), optional

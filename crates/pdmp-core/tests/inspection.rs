@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use ndarray::{Array2, s};
 use pdmp_core::learning::{CanonicalOptions, TransportSelection};
-use pdmp_core::preprocessing::inspection::{Finding, Padding, inspect, unwound};
+use pdmp_core::preprocessing::inspection::{Finding, Padding, cycle_ends, inspect, unwound};
 use pdmp_core::{Demonstration, FitOptions, Kind, Sampling, fit};
 
 /// Five reaches over bumps of different height, with two degrees of freedom that stay away from zero.
@@ -64,6 +64,24 @@ fn nothing_is_found_in_movements_clean_noisy_or_at_rest() {
     let through: Vec<_> = through.collect();
     let found = inspect(&demos(through), None);
     assert!(found.iter().all(|finding| !matches!(finding, Finding::Zeros { .. })), "{found:?}");
+}
+
+#[test]
+fn rounding_errors_of_a_constant_are_not_reported() {
+    // An angle in degrees, and a column that drifts, jumps to zero where samples were lost, and stops in motion.
+    let cycle = |size: f64, lost: usize, at_rest: usize| {
+        Array2::from_shape_fn((100 + at_rest, 2), |(c, d)| match d {
+            0 => 180.0 + 90.0 * (c.min(99) as f64 * TAU / 100.0).sin(),
+            _ if (50..50 + lost).contains(&c) => 0.0,
+            _ => size * (1.0 + 0.01 * c.min(99) as f64),
+        })
+    };
+    let found = |size: f64| {
+        let [drifts, drops, stops] = [(0, 0), (2, 0), (0, 10)].map(|(lost, rest)| demos(vec![cycle(size, lost, rest)]));
+        [cycle_ends(&drifts).len(), inspect(&drops, None).len(), inspect(&stops, None).len()]
+    };
+    assert_eq!(found(1.0), [1, 1, 1]);
+    assert_eq!(found(5e-14), [0, 0, 1]); // the angle stops as well
 }
 
 #[test]

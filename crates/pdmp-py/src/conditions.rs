@@ -25,7 +25,8 @@ const NAMES: [&str; 10] =
 /// Parameters
 /// ----------
 /// style : array_like, (J,), optional
-///     Style parameter s.
+///     Style parameter s. ``style=model.styles[m]`` alone keeps start, goal and duration of the nominal demonstration;
+///     ``model.conditions(m)`` has all of demonstration m.
 /// goal : array_like, (D,), optional
 ///     Goal g in the unit of each degree of freedom; discrete.
 /// start : array_like, (D,), optional

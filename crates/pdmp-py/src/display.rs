@@ -161,7 +161,14 @@ fn largest_noise(model: &pdmp_core::Model) -> Option<(String, String)> {
     let d = moving.max_by(|&a, &b| share(a).total_cmp(&share(b))).filter(|&d| share(d) > 0.0)?;
     let (name, unit) = (&model.names()[d], &model.units()[d]);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    Some((format!("{:.2e}{unit}", levels[d]), format!("{:.2} % of the range, in {name}", 100.0 * share(d))))
+    Some((format!("{}{unit}", three_digits(levels[d])), format!("{:.2} % of the range, in {name}", 100.0 * share(d))))
+}
+
+/// Formats a number with three significant digits, without an exponent where it stays short.
+fn three_digits(value: f64) -> String {
+    let text = format!("{value:.2e}");
+    let rounded = text.parse::<f64>().unwrap_or(value);
+    if (1e-4..1e6).contains(&rounded.abs()) { format!("{rounded}") } else { text }
 }
 
 /// Returns the labels of each context column, or the range of its numbers.

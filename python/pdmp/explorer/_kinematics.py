@@ -1,8 +1,10 @@
 """Forward kinematics as a table that the page evaluates exactly.
 
 Points of a chain of revolute joints are sums of products of 1, cos qᵢ and sin qᵢ, one factor for
-each joint before the point; for a prismatic joint the factors are 1 and qᵢ. With three values of
-each angle, or two of each length, the coefficients are those of an interpolation without error.
+each joint before the point; for a prismatic joint the factors are 1 and qᵢ, for a rotation the ten
+products of two components of its unit quaternion, of which the rotation matrix consists. With three
+values of each angle, two of each length, and ten rotations, the coefficients are those of an
+interpolation without error.
 """
 
 from __future__ import annotations
@@ -24,11 +26,19 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 MAX_JOINTS = 8
-"""Degrees of freedom of a point: 3⁸ = 6561 positions to evaluate."""
+"""Degrees of freedom of a point, three for a rotation: 3⁸ = 6561 positions to evaluate."""
 MAX_POINTS = 64
 MAX_ERROR = 1e-7
 """Largest error of the interpolation, relative to the extent of the points."""
 N_TESTS = 24
+ROTATION = "rotation"
+"""In place of a turn: the four columns from this one on are a unit quaternion, in any order."""
+PAIRS = [(i, j) for i in range(4) for j in range(i, 4)]
+ROTATIONS = [
+    np.bincount([i, j], minlength=4) / np.linalg.norm(np.bincount([i, j], minlength=4))
+    for i, j in PAIRS
+]
+"""Unit quaternions at which the products of all pairs of components are independent."""
 
 
 def stick_figure(
@@ -38,22 +48,25 @@ def stick_figure(
 ) -> dict[str, Any]:
     """Returns the coefficients of each point, and the links between points."""
     check_function("kinematics", kinematics)
-    if model.rotations:
-        raise value_error(
-            "kinematics do not apply to a model with rotations: a stick figure needs joint "
-            "positions; omit kinematics"
-        )
     tests = _tests(model)
     first = _points(kinematics, tests[0], None)
     scale = max(float(np.ptp(first, axis=0).max()), float(abs(first).max()), 1e-300)
-    turns = [_turn(kinematics, model.units[d], tests, d, scale) for d in range(model.n_dofs)]
+    inside = {column + k for column in model.rotations for k in (1, 2, 3)}
+    turns: dict[int, float | str | None] = {
+        d: ROTATION
+        if d in model.rotations
+        else _turn(kinematics, model.coordinate_units[d], tests, d, scale)
+        for d in range(model.n_coordinates)
+        if d not in inside
+    }
     found = [_points(kinematics, q, first.shape) for q in tests]
     points = []
     for p in range(len(first)):
-        joints = _joints(kinematics, tests, p, scale)
-        if len(joints) > MAX_JOINTS:
+        joints = _joints(kinematics, turns, tests, p, scale)
+        n_dofs = sum(3 if turns[d] == ROTATION else 1 for d in joints)
+        if n_dofs > MAX_JOINTS:
             raise value_error(
-                f"kinematics: point {p} depends on {len(joints)} degrees of freedom, more than "
+                f"kinematics: point {p} depends on {n_dofs} degrees of freedom, more than "
                 f"{MAX_JOINTS}: omit points that depend on more"
             )
         points.append({"dofs": joints, "turns": [turns[d] for d in joints]})
@@ -62,12 +75,12 @@ def stick_figure(
         for p, point in enumerate(points):
             error = abs(evaluate(point, q) - expected[p]).max()
             if not error <= MAX_ERROR * scale:
-                names = map(join_label, model.names, model.units)
+                names = map(join_label, model.coordinate_names, model.coordinate_units)
                 raise value_error(
                     f"kinematics: point {p} is no sum of products of 1, cos q and sin q, or 1 and "
                     f"q, of the degrees of freedom ({', '.join(names)}): it differs by {error:.3g} "
                     "from such a sum; state the unit of each, pass points of a chain of "
-                    "revolute or prismatic joints, or omit kinematics"
+                    "revolute or prismatic joints or of a rotated body, or omit kinematics"
                 )
     return {"dimension": first.shape[1], "links": _links(links, len(first)), "points": points}
 
@@ -76,14 +89,22 @@ def evaluate(point: dict[str, Any], position: Array) -> Array:
     """Returns a point at a position (D,), as the page computes it."""
     values = point["coefficients"]
     for d, turn in zip(point["dofs"], point["turns"], strict=True):
-        values = np.tensordot(_factors(position[d], turn), values, axes=1)
+        values = np.tensordot(_factors(position[_columns(d, turn)], turn), values, axes=1)
     return np.asarray(values)
 
 
-def _factors(value: float, turn: float | None) -> Array:
+def _columns(d: int, turn: float | str | None) -> slice:
+    """Returns the coordinates of a joint or rotation."""
+    return slice(d, d + (4 if turn == ROTATION else 1))
+
+
+def _factors(value: Array, turn: float | str | None) -> Array:
+    """Returns the factors of the coordinates of a joint or rotation."""
     if turn is None:
-        return np.array([1.0, value])
-    angle = value / turn * TURN
+        return np.array([1.0, value[0]])
+    if isinstance(turn, str):
+        return np.array([value[i] * value[j] for i, j in PAIRS]) / (value @ value)
+    angle = value[0] / turn * TURN
     return np.array([1.0, np.cos(angle), np.sin(angle)])
 
 
@@ -102,7 +123,10 @@ def _points(
 
 
 def _tests(model: Model) -> list[Array]:
-    """Returns positions in twice the range of the demonstrations, the same in every call."""
+    """Returns positions in twice the range of the demonstrations, the same in every call.
+
+    Rotations are any.
+    """
     paths = [
         model.rollout(model.conditions(m), dt=model.durations[m] / 20).position
         for m in range(min(model.n_demos, 20))
@@ -111,9 +135,16 @@ def _tests(model: Model) -> list[Array]:
     middle, half = (low + high) / 2, np.maximum(high - low, 1e-3 * abs(high) + 1e-9)
     # Fractions of multiples of √prime are spread evenly and differ between degrees of freedom.
     primes = [n for n in range(2, 2000) if all(n % k for k in range(2, int(n**0.5) + 1))]
-    roots = np.sqrt(primes[: model.n_dofs])
-    shares = [(k * roots) % 1 for k in range(1, N_TESTS + 1)]
-    return [middle + half * (2 * share - 1) for share in shares]
+    roots = np.sqrt(primes[: model.n_coordinates])
+    found = []
+    for k in range(1, N_TESTS + 1):
+        share = 2 * ((k * roots) % 1) - 1
+        position = middle + half * share
+        for column in model.rotations:
+            quaternion = share[column : column + 4]
+            position[column : column + 4] = quaternion / np.linalg.norm(quaternion)
+        found.append(position)
+    return found
 
 
 def _turn(
@@ -134,15 +165,18 @@ def _turn(
 
 
 def _joints(
-    kinematics: Callable[[Array], ArrayLike], tests: list[Array], p: int, scale: float
+    kinematics: Callable[[Array], ArrayLike],
+    turns: dict[int, float | str | None],
+    tests: list[Array],
+    p: int,
+    scale: float,
 ) -> list[int]:
-    """Returns the degrees of freedom on which a point depends."""
-    n = len(tests[0])
+    """Returns the joints and rotations on which a point depends, by their first coordinate."""
     joints = []
-    for d in range(n):
+    for d, turn in turns.items():
         for q, other in zip(tests[:4], tests[4:8], strict=True):
-            moved = q.copy()
-            moved[d] = other[d]
+            moved, own = q.copy(), _columns(d, turn)
+            moved[own] = other[own]
             change = _points(kinematics, moved, None)[p] - _points(kinematics, q, None)[p]
             if abs(change).max() > 1e-12 * scale:
                 joints.append(d)
@@ -157,16 +191,12 @@ def _interpolate(
     computed: dict[tuple[float, ...], Array] = {}
     for p, point in enumerate(points):
         joints, turns = point["dofs"], point["turns"]
-        nodes = [
-            base[d] + np.array([0.0, 1.0]) * max(abs(base[d]), 1.0)
-            if turn is None
-            else np.arange(3) * turn / 3
-            for d, turn in zip(joints, turns, strict=True)
-        ]
+        nodes = [_nodes(base[d], turn) for d, turn in zip(joints, turns, strict=True)]
         values = []
         for combination in product(*nodes):
             position = base.copy()
-            position[joints] = combination
+            for d, turn, value in zip(joints, turns, combination, strict=True):
+                position[_columns(d, turn)] = value
             key = tuple(position.tolist())
             if key not in computed:
                 computed[key] = _points(kinematics, position, None)
@@ -176,6 +206,15 @@ def _interpolate(
             inverse = np.linalg.inv([_factors(value, turn) for value in at])
             tensor = np.moveaxis(np.tensordot(inverse, tensor, axes=(1, axis)), 0, axis)
         point["coefficients"] = tensor
+
+
+def _nodes(base: float, turn: float | str | None) -> list[Array]:
+    """Returns values of a joint or rotation, one for each of its factors."""
+    if turn is None:
+        return [np.array([base + share * max(abs(base), 1.0)]) for share in (0.0, 1.0)]
+    if isinstance(turn, str):
+        return ROTATIONS
+    return [np.array([k * turn / 3]) for k in range(3)]
 
 
 def _links(links: Sequence[tuple[int, int]] | None, n: int) -> list[list[int]]:

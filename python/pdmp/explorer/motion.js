@@ -224,7 +224,16 @@ class Primitive {
   }
 }
 
-/** Points of a stick figure: sums of products of 1, cos q and sin q, or 1 and q, of the degrees of freedom. */
+/** Returns the products of all pairs of components of a quaternion, relative to its squared length. */
+function pairProducts(q) {
+  const square = dot(q, q);
+  return q.flatMap((a, i) => q.slice(i).map((b) => (a * b) / square));
+}
+
+/**
+ * Points of a stick figure: sums of products of 1, cos q and sin q, or 1 and q, of the degrees of freedom, and of products of
+ * two components of rotations.
+ */
 class Kinematics {
   constructor({ dimension, links, points }) {
     this.dimension = dimension;
@@ -232,13 +241,20 @@ class Kinematics {
     this.points = points.map((point) => ({ ...point, coefficients: decode(point.coefficients) }));
   }
 
+  /** Returns the factors of a joint, or of the rotation from a column on. */
+  static factors(position, column, turn) {
+    if (turn === "rotation") return pairProducts(Array.from(position).slice(column, column + 4));
+    if (turn === null) return [1, position[column]];
+    const angle = (position[column] / turn) * 2 * Math.PI;
+    return [1, Math.cos(angle), Math.sin(angle)];
+  }
+
   /** Returns one point at a position. */
   point(p, position) {
     const { dofs, turns, coefficients } = this.points[p];
     let values = coefficients;
     dofs.forEach((dof, i) => {
-      const angle = turns[i] === null ? 0 : (position[dof] / turns[i]) * 2 * Math.PI;
-      const factors = turns[i] === null ? [1, position[dof]] : [1, Math.cos(angle), Math.sin(angle)];
+      const factors = Kinematics.factors(position, dof, turns[i]);
       const rest = values.length / factors.length;
       const sums = new Float64Array(rest);
       factors.forEach((factor, f) => {

@@ -1,9 +1,16 @@
 """Figures of recordings, models and evaluations; they need the extra `plot`.
 
-Every function draws on its argument `figure`, or on a new figure, and returns it: a notebook shows
-it as the value of a cell, and `save` writes it: `plot.save(plot.styles(model), "styles.png")`. For
-a window, draw on `matplotlib.pyplot.figure(layout="constrained")` and call
-`matplotlib.pyplot.show()`. A figure of `Figure.subfigures` takes its place beside others.
+Every function draws into a new figure and returns it: a notebook shows it as the value of a cell,
+and `save` writes it: `plot.save(plot.styles(model), "styles.png")`. With `ax=` it draws into Axes
+of yours: one for each panel, row by row, or a single one in whose place the panels are made.
+`matplotlib.pyplot.show()` shows them in a window, a notebook at the end of the cell::
+
+    figure, (left, right) = plt.subplots(1, 2, layout="constrained")
+    plot.styles(model, ax=left)
+    plot.demonstrations(model, demos, ax=right);  # the semicolon hides the value
+
+`rcParams` apply. Where these keep their default, colours are those of Okabe and Ito, which
+colour-blind readers distinguish, and the resolution is 150 pixels per inch.
 """
 
 from pdmp.plot.canvas import save

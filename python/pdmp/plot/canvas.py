@@ -7,18 +7,20 @@ from math import ceil
 from os import PathLike
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from numpy.typing import NDArray
+import numpy as np
 
 from pdmp._files import atomic_write
 from pdmp._labels import join_label
+from pdmp._messages import counted
 from pdmp._native import Model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
 
 # Palette of Okabe and Ito, ordered by contrast on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -26,24 +28,125 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 MAX_LABEL = 20
 """Largest number of characters of an axis label in one line."""
 BLUE, ORANGE, GREY = PALETTE[0], PALETTE[1], "#B8B8B8"
+Place: TypeAlias = Literal["outside lower center", "outside right upper"]
+DPI = 150
+"""Resolution of a figure unless rcParams have another one [pixels per inch]."""
 
 
-def ensure_figure(figure: Figure | None, width: float, height: float) -> Figure:
-    """Returns `figure`, or a new one of this size [inches]."""
-    if figure is not None:
-        return figure
+def changed(name: str) -> Any:
+    """Returns a parameter of `matplotlib.rcParams` that differs from its default, or None."""
+    from matplotlib import rcParams, rcParamsDefault
+
+    current: Any = rcParams
+    default: Any = rcParamsDefault
+    return None if current[name] == default[name] else current[name]
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Returns a figure of this size [inches], or in proportion to the size in rcParams."""
     try:
         from pdmp.plot._figure import _NotebookFigure
     except ImportError:
         raise ImportError("figures need matplotlib: pip install 'pdmp[plot]'") from None
-    return _NotebookFigure(figsize=(width, height), layout="constrained", dpi=150)
+    from matplotlib import rcParamsDefault
+
+    size = changed("figure.figsize")
+    if size is not None:
+        usual = rcParamsDefault["figure.figsize"]
+        width, height = width * size[0] / usual[0], height * size[1] / usual[1]
+    dpi = changed("figure.dpi") or DPI
+    return _NotebookFigure(figsize=(width, height), layout="constrained", dpi=dpi)
+
+
+def colors() -> Sequence[str]:
+    """Returns the colours of lines in their order: those of rcParams, or the palette."""
+    cycle = changed("axes.prop_cycle")
+    return PALETTE if cycle is None else cycle.by_key().get("color", PALETTE)
+
+
+def line_color(k: int) -> str:
+    """Returns colour k of lines, from the first one again after the last one."""
+    each = colors()
+    return each[k % len(each)]
 
 
 def colormap() -> Colormap:
-    """Returns a colour map from blue to orange without colours that are pale on white."""
+    """Returns the colour map of rcParams, or one from blue to orange without pale colours."""
+    import matplotlib
     from matplotlib.colors import LinearSegmentedColormap
 
+    name = changed("image.cmap")
+    if name is not None:
+        return matplotlib.colormaps[name]
     return LinearSegmentedColormap.from_list("pdmp", [BLUE, PALETTE[3], ORANGE])
+
+
+def draw_panels(
+    ax: Axes | ArrayLike | None,
+    n: int,
+    n_columns: int,
+    size: tuple[float, float],
+    *,
+    heights: Sequence[float] | None = None,
+    sharex: bool = False,
+    sharey: bool | Literal["row"] = False,
+) -> list[Axes]:
+    """Returns n panels in rows of n_columns.
+
+    Parameters
+    ----------
+    ax : Axes or array of Axes, optional
+        The n panels themselves, or one Axes in whose place they are made; by default a new figure
+        is made.
+    size : tuple of float
+        Width and height of a new figure [inches].
+    heights : sequence of float, optional
+        Heights of the rows in proportion.
+
+    Raises
+    ------
+    ValueError
+        Another number of Axes, or one outside a grid in whose place there should be several.
+    TypeError
+        Not Axes.
+    """
+    figure = new_figure(*size) if ax is None else None
+    from matplotlib.axes import Axes
+
+    n_rows = ceil(n / n_columns)
+    share: dict[str, Any] = {"sharex": sharex, "sharey": sharey, "squeeze": False}
+    if figure is not None:
+        grid = figure.subplots(n_rows, n_columns, height_ratios=heights, **share)
+    elif isinstance(ax, Axes):
+        if n == 1:
+            return [ax]
+        place = ax.get_subplotspec()
+        if place is None:
+            raise ValueError(
+                f"ax is not one of pyplot.subplots: pass {n} Axes, {n_rows} rows of {n_columns}"
+            )
+        ax.set_axis_off()
+        grid = place.subgridspec(n_rows, n_columns, height_ratios=heights).subplots(**share)
+    else:
+        given = list(np.ravel(np.asarray(ax, dtype=object)))
+        for each in given:
+            if not isinstance(each, Axes):
+                raise TypeError(f"ax: expected Axes of matplotlib, got {type(each).__name__}")
+        if len(given) != n:
+            raise ValueError(
+                f"ax has {counted(len(given), 'panel')}, expected {n}: {n_rows} rows of "
+                f"{n_columns}; or pass one Axes, in whose place they are made"
+            )
+        return given
+    for axes in grid.ravel()[n:]:
+        axes.set_axis_off()
+    return list(grid.ravel()[:n])
+
+
+def figure_of(panels: Sequence[Axes]) -> Figure:
+    """Returns the figure that has the panels."""
+    # The figure of a part of a figure is the whole.
+    return panels[0].figure.figure
 
 
 def label_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
@@ -62,47 +165,45 @@ def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
 
 
 def movement_panels(
-    model: Model, titles: Sequence[str], figure: Figure | None
-) -> tuple[Figure, list[list[Axes]]]:
-    """Returns a figure and, per title, a column of panels for `draw_movement`.
+    model: Model, titles: Sequence[str], ax: Axes | ArrayLike | None
+) -> list[list[Axes]]:
+    """Returns a column of panels for `draw_movement` per title.
 
     With two degrees of freedom, the first panel is for the path. The others are for each degree of
     freedom over time, in a grid if one column has more than four.
     """
     labels = dof_labels(model.coordinate_names, model.coordinate_units)
     if len(titles) == 1 and len(labels) > 4:
-        figure, panels = grid_panels(labels, "time [s]", figure)
-        if titles[0]:
-            figure.suptitle(titles[0])
-        return figure, [panels]
+        panels = grid_panels(labels, "time [s]", ax)
+        panels[0].set_title(titles[0])
+        return [panels]
     has_path = len(labels) == 2
     heights = [3.6] * has_path + [1.7] * len(labels)
-    figure = ensure_figure(figure, max(3.2 * len(titles), 5.5), sum(heights) + 0.5)
-    grid = figure.subplots(len(heights), len(titles), squeeze=False, height_ratios=heights)
-    for column, title in zip(grid.T, titles, strict=True):
+    n = len(titles)
+    size = max(3.2 * n, 5.5), sum(heights) + 0.5
+    panels = draw_panels(ax, n * len(heights), n, size, heights=heights)
+    columns = [panels[k::n] for k in range(n)]
+    for column, title in zip(columns, titles, strict=True):
         if has_path:
             label_axes(column[0], *labels)
             column[0].set_aspect("equal", adjustable="datalim")
         for axes, label in zip(column[has_path:], labels, strict=True):
             label_axes(axes, "time [s]", label)
         column[0].set_title(title)
-    return figure, [list(column) for column in grid.T]
+    return columns
 
 
-def grid_panels(labels: Sequence[str], x: str, figure: Figure | None) -> tuple[Figure, list[Axes]]:
-    """Returns a figure and a grid with a panel per label, over `x`."""
+def grid_panels(labels: Sequence[str], x: str, ax: Axes | ArrayLike | None) -> list[Axes]:
+    """Returns a grid with a panel per label, over `x`."""
     n_columns = min(len(labels), 3 if len(labels) < 13 else 5)
-    n_rows = ceil(len(labels) / n_columns)
-    figure = ensure_figure(figure, max(3.2 * n_columns, 5.5), 1.9 * n_rows + 0.5)
-    panels = figure.subplots(n_rows, n_columns, sharex=True, squeeze=False).ravel()
-    for axes, label in zip(panels, labels, strict=False):
+    size = max(3.2 * n_columns, 5.5), 1.9 * ceil(len(labels) / n_columns) + 0.5
+    panels = draw_panels(ax, len(labels), n_columns, size, sharex=True)
+    for axes, label in zip(panels, labels, strict=True):
         label_axes(axes, "", label)
-    for axes in panels[len(labels) - n_columns : len(labels)]:
+    for axes in panels[-n_columns:]:
         axes.set_xlabel(x)
         axes.xaxis.set_tick_params(labelbottom=True)
-    for axes in panels[len(labels) :]:
-        axes.set_axis_off()
-    return figure, list(panels[: len(labels)])
+    return panels
 
 
 def draw_movement(
@@ -116,15 +217,23 @@ def draw_movement(
         axes.plot(time, trace, **style)
 
 
-def legend(figure: Figure, axes: Axes) -> None:
-    """Adds a legend below the figure, with one entry per label of `axes`."""
+def legend(axes: Axes, place: Place = "outside lower center") -> None:
+    """Adds a legend with one entry per label of `axes`.
+
+    It has this place in a figure of this package, and is in `axes` of another figure.
+    """
     handles, labels = axes.get_legend_handles_labels()
     entries = dict(zip(labels, handles, strict=True))
-    figure.legend(
+    from pdmp.plot._figure import _NotebookFigure
+
+    if not isinstance(axes.figure, _NotebookFigure):
+        axes.legend(list(entries.values()), list(entries))
+        return
+    axes.figure.legend(
         list(entries.values()),
         list(entries),
-        loc="outside lower center",
-        ncols=len(entries),
+        loc=place,
+        ncols=1 if "right" in place else len(entries),
         frameon=False,
     )
 

@@ -9,11 +9,12 @@ import numpy as np
 
 from pdmp._labels import DERIVATIVES
 from pdmp._native import Limits, Trajectory
-from pdmp.plot.canvas import PALETTE, dof_labels, ensure_figure, label_axes, legend
+from pdmp.plot.canvas import dof_labels, draw_panels, figure_of, label_axes, legend, line_color
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 TITLES = ("position", "velocity", "acceleration")
 
@@ -22,7 +23,7 @@ def motion(
     trajectories: Trajectory | Sequence[Trajectory] | Mapping[str, Trajectory],
     *,
     limits: Limits | None = None,
-    figure: Figure | None = None,
+    ax: Axes | ArrayLike | None = None,
 ) -> Figure:
     """Draws position, velocity and acceleration over time, with a row per degree of freedom.
 
@@ -33,8 +34,8 @@ def motion(
         mapping are their labels.
     limits : Limits, optional
         Limits, which are drawn as dashed lines.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -55,8 +56,9 @@ def motion(
     names = [first.names, first.dof_names, first.dof_names]
     units = [first.units, first.dof_units, first.dof_units]
     n_rows = len(first.names)
-    figure = ensure_figure(figure, 9.6, 1.7 * n_rows + 0.8)
-    grid = figure.subplots(n_rows, len(TITLES), sharex=True, squeeze=False)
+    size = 9.6, 1.7 * n_rows + 0.8
+    panels = draw_panels(ax, n_rows * len(TITLES), len(TITLES), size, sharex=True)
+    grid = np.reshape(np.array(panels, dtype=object), (n_rows, len(TITLES)))
     for column, (title, (_, per)) in enumerate(zip(TITLES, DERIVATIVES, strict=True)):
         own = [unit and unit + per for unit in units[column]]
         texts = dof_labels(names[column], own)
@@ -71,12 +73,12 @@ def motion(
         derivatives = (trajectory.position, trajectory.velocity, trajectory.acceleration)
         for column, values in enumerate(derivatives):
             for axes, trace in zip(grid[:, column], values.T, strict=False):
-                axes.plot(trajectory.time, trace, color=PALETTE[k % len(PALETTE)], label=label)
+                axes.plot(trajectory.time, trace, color=line_color(k), label=label)
     if limits is not None:
         _draw_limits(grid.T, limits, len(first.dof_names))
     if any(label for label, _ in labelled):
-        legend(figure, grid[0, 0])
-    return figure
+        legend(panels[0])
+    return figure_of(panels)
 
 
 def _labelled(
@@ -111,4 +113,4 @@ def _draw_limits(columns: NDArray[Any], limits: Limits, n_dofs: int) -> None:
                 raise ValueError(f"limits of {len(bound)} degrees of freedom, expected {n_dofs}")
             for axes, value in zip(column, np.broadcast_to(bound, n_dofs), strict=False):
                 if np.isfinite(value):
-                    axes.axhline(value, color="black", linewidth=0.8, linestyle="--")
+                    axes.axhline(value, color=axes.title.get_color(), linewidth=0.8, linestyle="--")

@@ -9,11 +9,20 @@ import numpy as np
 
 from pdmp._messages import counted
 from pdmp._native import Conditions, Demonstration, Model, blend
-from pdmp.plot.canvas import BLUE, GREY, colormap, draw_movement, legend, movement_panels
+from pdmp.plot.canvas import (
+    GREY,
+    colormap,
+    draw_movement,
+    figure_of,
+    legend,
+    line_color,
+    movement_panels,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 N_SAMPLES = 500
 
@@ -23,7 +32,7 @@ def demonstrations(
     demos: Sequence[Demonstration] | Mapping[str, Demonstration],
     *,
     labels: Sequence[str] | None = None,
-    figure: Figure | None = None,
+    ax: Axes | ArrayLike | None = None,
 ) -> Figure:
     """Draws the demonstrations and their reproductions by the model, with a column per label.
 
@@ -37,8 +46,8 @@ def demonstrations(
         The M demonstrations, in the order of the fit.
     labels : sequence of str, optional
         Label of each of the M demonstrations.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -53,23 +62,29 @@ def demonstrations(
     labels = [""] * len(demos) if labels is None else labels
     _check_number(model, "label", len(labels))
     titles = list(dict.fromkeys(labels))
-    figure, columns = movement_panels(model, titles, figure)
+    columns = movement_panels(model, titles, ax)
     for m, (demo, label) in enumerate(zip(demos, labels, strict=True)):
         panels = columns[titles.index(label)]
         rollout = model.rollout(model.conditions(m), dt=model.durations[m] / N_SAMPLES)
         time = sample_times(model, m, demo)
         draw_movement(panels, time, demo.position, color=GREY, linewidth=3, label="demonstration")
         draw_movement(
-            panels, rollout.time, rollout.position, color=BLUE, linewidth=0.9, label="reproduction"
+            panels,
+            rollout.time,
+            rollout.position,
+            color=line_color(0),
+            linewidth=0.9,
+            label="reproduction",
         )
-    legend(figure, columns[0][0])
-    return figure
+    legend(columns[0][0])
+    return figure_of(columns[0])
 
 
 def sample_times(model: Model, m: int, demo: Demonstration) -> NDArray[np.float64]:
     """Returns the times (T,) of the samples of demonstration m [s], from 0."""
     if demo.time is not None:
-        return demo.time - demo.time[0]
+        time: NDArray[np.float64] = demo.time - demo.time[0]
+        return time
     ends = model.kind == "discrete"
     return np.linspace(0, model.durations[m], demo.n_samples, endpoint=ends)
 
@@ -113,7 +128,7 @@ def fan(
     *,
     n: int = 9,
     ends: tuple[str, str] = ("a", "b"),
-    figure: Figure | None = None,
+    ax: Axes | ArrayLike | None = None,
 ) -> Figure:
     """Draws movements whose conditions are blended from `a` to `b`.
 
@@ -127,8 +142,8 @@ def fan(
         Number of movements, at least 2.
     ends : tuple of str
         Labels of `a` and `b`.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -142,7 +157,7 @@ def fan(
     shares = np.linspace(0, 1, n)
     dt = model.durations.min() / N_SAMPLES
     rollouts = [model.rollout(blend(a, b, share), dt=dt) for share in shares]
-    figure, (panels,) = movement_panels(model, [""], figure)
+    (panels,) = movement_panels(model, [""], ax)
     from matplotlib.cm import ScalarMappable
 
     mapping = ScalarMappable(cmap=colormap())
@@ -158,6 +173,7 @@ def fan(
             markevery=[0],
             markersize=4,
         )
+    figure = figure_of(panels)
     bar = figure.colorbar(mapping, ax=panels, ticks=[0, 0.5, 1], aspect=40)
     bar.ax.set_yticklabels([ends[0], "half way", ends[1]])
     return figure

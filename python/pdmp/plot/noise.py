@@ -8,10 +8,12 @@ import numpy as np
 
 from pdmp._labels import join_label
 from pdmp._native import Demonstration, residuals
-from pdmp.plot.canvas import BLUE, GREY, ORANGE, grid_panels, legend
+from pdmp.plot.canvas import GREY, figure_of, grid_panels, legend, line_color
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 N_FREQUENCIES = 200
 # Shares of half the sampling rate: the largest cut-off drawn, and the range of cut-offs at which
@@ -22,7 +24,7 @@ NOISE_RANGE = (0.3, 0.7)
 MAX_RESIDUAL = 5.0
 
 
-def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
+def cut_off(demo: Demonstration, *, ax: Axes | ArrayLike | None = None) -> Figure:
     """Draws the residuals of `pdmp.preprocessing.lowpass` over its cut-off (residual analysis).
 
     Each panel has the root mean square R of the residual of one degree of freedom. The residual of
@@ -35,8 +37,8 @@ def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
     ----------
     demo : Demonstration
         A recording with `dt` or `time`.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -57,22 +59,22 @@ def cut_off(demo: Demonstration, *, figure: Figure | None = None) -> Figure:
     rms = residuals(demo, frequencies)
     names = demo.names or [f"y{d}" for d in range(demo.n_coordinates)]
     labels = [join_label("RMS", unit) for unit in demo.units or [""] * demo.n_coordinates]
-    figure, panels = grid_panels(labels, "cut-off [Hz]", figure)
+    panels = grid_panels(labels, "cut-off [Hz]", ax)
     noise_only = (frequencies > NOISE_RANGE[0] * half_rate) & (
         frequencies < NOISE_RANGE[1] * half_rate
     )
     for axes, name, residual in zip(panels, names, rms.T, strict=True):
-        axes.plot(frequencies, residual, color=BLUE, label="residual")
+        axes.plot(frequencies, residual, color=line_color(0), label="residual")
         axes.set_title(name)
         slope, noise = np.polyfit(frequencies[noise_only], residual[noise_only], 1)
         if noise <= 0:  # a constant has no residual
             continue
         selected = np.interp(-noise, -residual, frequencies)
         line = noise + slope * frequencies
-        axes.plot(frequencies, line, "--", color=ORANGE, label="noise alone")
+        axes.plot(frequencies, line, "--", color=line_color(1), label="noise alone")
         axes.axhline(noise, color=GREY, linewidth=0.8, label="level of noise")
-        axes.plot(selected, noise, "o", color=ORANGE, label="cut-off")
+        axes.plot(selected, noise, "o", color=line_color(1), label="cut-off")
         axes.set_title(f"{name}: {selected:.2g} Hz")
         axes.set_ylim(0, MAX_RESIDUAL * noise)
-    legend(figure, panels[0])
-    return figure
+    legend(panels[0])
+    return figure_of(panels)

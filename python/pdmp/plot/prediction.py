@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pdmp._labels import join_label
-from pdmp.plot.canvas import BLUE, GREY, PALETTE, dof_labels, ensure_figure, label_axes, legend
+from pdmp.plot.canvas import (
+    GREY,
+    colors,
+    dof_labels,
+    draw_panels,
+    figure_of,
+    label_axes,
+    legend,
+    line_color,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
     from pdmp.evaluation import Evaluation
 
@@ -19,7 +30,7 @@ MAX_DOFS = 6
 
 
 def prediction_error(
-    evaluation: Evaluation, *, unit: str = "", figure: Figure | None = None
+    evaluation: Evaluation, *, unit: str = "", ax: Axes | ArrayLike | None = None
 ) -> Figure:
     """Draws E over the number of style parameters J, with a panel per reach.
 
@@ -32,8 +43,8 @@ def prediction_error(
         Result of `pdmp.evaluate`, such as for the predictors of `evaluation.over_styles`.
     unit : str
         Unit of the positions, such as "rad".
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -55,10 +66,10 @@ def prediction_error(
             "evaluate those of over_styles(J)"
         )
     reaches = evaluation.reaches()
-    figure = ensure_figure(figure, 4.6 * len(reaches), 3.8)
+    size = 4.6 * len(reaches), 3.8
+    panels = draw_panels(ax, len(reaches), len(reaches), size, sharey=True)
     from matplotlib.ticker import MaxNLocator
 
-    panels = figure.subplots(1, len(reaches), squeeze=False, sharey=True)[0]
     for axes, reach in zip(panels, reaches, strict=True):
         means = [evaluation.summary(name, reach) for name in styles]
         deviation = np.nan_to_num([mean.deviation for mean in means])
@@ -66,26 +77,26 @@ def prediction_error(
             list(styles.values()),
             [mean.error for mean in means],
             deviation,
-            color=BLUE,
+            color=line_color(0),
             marker="o",
             markersize=4,
             capsize=3,
             label="PDMP",
         )
         levels = [name for name in evaluation.scores if name not in styles]
-        for name, color in zip(levels, cycle(PALETTE[:0:-1])):
+        for name, color in zip(levels, cycle(colors()[:0:-1])):
             level = evaluation.summary(name, reach).error
             axes.axhline(level, color=color, linestyle="--", linewidth=1, label=name)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         label_axes(axes, "number of style parameters J", "", reach)
     panels[0].set_ylim(bottom=0)
     panels[0].set_ylabel(join_label("E", unit and f"{unit}²"))
-    legend(figure, panels[0])
-    return figure
+    legend(panels[0])
+    return figure_of(panels)
 
 
 def held_out(
-    evaluation: Evaluation, predictor: str, *, unit: str = "", figure: Figure | None = None
+    evaluation: Evaluation, predictor: str, *, unit: str = "", ax: Axes | ArrayLike | None = None
 ) -> Figure:
     """Draws predictions with their 90 % band, and the held-out demonstrations.
 
@@ -100,8 +111,8 @@ def held_out(
         Name of the predictor.
     unit : str
         Unit of the positions, such as "rad", instead of those of the demonstrations.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -121,11 +132,12 @@ def held_out(
     dofs = np.sort(np.argsort(-spread, kind="stable")[:MAX_DOFS])
     duration = "duration" if recordings.kind == "discrete" else "period"
     reaches = evaluation.reaches()
-    figure = ensure_figure(figure, 4.2 * len(reaches), 1.7 * len(dofs) + 0.8)
-    grid = figure.subplots(len(dofs), len(reaches), squeeze=False, sharex=True, sharey="row")
+    n, size = len(reaches), (4.2 * len(reaches), 1.7 * len(dofs) + 0.8)
+    panels = draw_panels(ax, n * len(dofs), n, size, sharex=True, sharey="row")
     phase = np.linspace(0, 1, recordings.n_samples, endpoint=recordings.kind == "discrete")
-    for column, reach in zip(grid.T, reaches, strict=True):
-        rows = [k for k, split in enumerate(evaluation.splits) if split.reach == reach]
+    for k, reach in enumerate(reaches):
+        column = panels[k::n]
+        rows = [i for i, split in enumerate(evaluation.splits) if split.reach == reach]
         median = rows[int(np.argsort(score.error[rows], kind="stable")[(len(rows) - 1) // 2])]
         test, forecast = evaluation.splits[median].test, evaluation.forecasts[predictor][median][0]
         context = recordings.contexts[test[0]]
@@ -138,12 +150,12 @@ def held_out(
             mean = predicted[:, dof]
             if forecast.variance is not None:
                 half = HALF_WIDTH * np.sqrt(forecast.variance[:, dof])
-                band = {"color": BLUE, "alpha": 0.15, "linewidth": 0}
+                band: dict[str, Any] = {"color": line_color(0), "alpha": 0.15, "linewidth": 0}
                 axes.fill_between(phase, mean - half, mean + half, label=f"{BAND:.0%} band", **band)
-            axes.plot(phase, mean, color=BLUE, linewidth=1.2, label="predicted")
+            axes.plot(phase, mean, color=line_color(0), linewidth=1.2, label="predicted")
             label_axes(axes, "", labels[dof])
         values = (v if isinstance(v, str) else f"{v:.3g}" for v in context)
         column[0].set_title(f"{reach}, context {' '.join(values)}")
         column[-1].set_xlabel(f"share of the {duration}")
-    legend(figure, grid[0, 0])
-    return figure
+    legend(panels[0])
+    return figure_of(panels)

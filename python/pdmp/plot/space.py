@@ -9,47 +9,49 @@ import numpy as np
 
 from pdmp._native import Model
 from pdmp.plot.canvas import (
-    BLUE,
     GREY,
     MARKERS,
-    ORANGE,
-    PALETTE,
     colormap,
-    ensure_figure,
+    colors,
+    draw_panels,
+    figure_of,
     label_axes,
+    legend,
+    line_color,
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 
-def singular_values(model: Model, *, figure: Figure | None = None) -> Figure:
+def singular_values(model: Model, *, ax: Axes | None = None) -> Figure:
     """Draws the share of each singular value in their sum, and the number J of styles.
 
     Parameters
     ----------
     model : Model
         The primitive.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes, optional
+        The panel; by default that of a new figure.
 
     Raises
     ------
     ImportError
         matplotlib is not installed.
     """
-    figure = ensure_figure(figure, 7.0, 4.0)
+    (axes,) = draw_panels(ax, 1, 1, (7.0, 4.0))
     from matplotlib.ticker import MaxNLocator
 
     total = model.singular_values.sum() or 1.0
     share = 100 * model.singular_values / total
     number = np.arange(1, len(share) + 1)
     n_kept = model.n_styles
-    axes = figure.subplots()
-    axes.bar(number[:n_kept], share[:n_kept], color=BLUE, label=f"kept: J = {n_kept}")
+    axes.bar(number[:n_kept], share[:n_kept], color=line_color(0), label=f"kept: J = {n_kept}")
     if n_kept < len(share):
         axes.bar(number[n_kept:], share[n_kept:], color=GREY, label="left out")
-    axes.plot(number, share.cumsum(), "o-", color=ORANGE, markersize=4, label="sum so far")
+    axes.plot(number, share.cumsum(), "o-", color=line_color(1), markersize=4, label="sum so far")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set_xlim(0.4, len(share) + 0.6)
     axes.set_ylim(0, 105)
@@ -57,11 +59,11 @@ def singular_values(model: Model, *, figure: Figure | None = None) -> Figure:
     title = f"J = {n_kept} of {model.n_demos}: {truncated}"
     label_axes(axes, "singular value, of those computed", "share of their sum [%]", title)
     axes.legend(frameon=False, loc="center right")
-    return figure
+    return figure_of([axes])
 
 
 def styles(
-    model: Model, labels: Sequence[str] | None = None, *, figure: Figure | None = None
+    model: Model, labels: Sequence[str] | None = None, *, ax: Axes | ArrayLike | None = None
 ) -> Figure:
     """Draws the style of each demonstration, in the planes of the first three style parameters.
 
@@ -74,8 +76,8 @@ def styles(
         The primitive.
     labels : sequence of str, optional
         Label of each of the M demonstrations.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -95,28 +97,27 @@ def styles(
     points = np.column_stack([model.styles, np.arange(model.n_demos)])
     names = [f"style $s_{{{j + 1}}}$" for j in range(model.n_styles)] + ["demonstration"]
     others = [1, 2] if model.n_styles > 2 else [1]
-    figure = ensure_figure(figure, 1.0 + 4.5 * len(others), 4.2)
     groups = list(dict.fromkeys(labels or [""]))
     values = None
     if isinstance(context, np.ndarray) and context.shape[1] == 1:
         values = context[:, 0]
-    panels = figure.subplots(1, len(others), squeeze=False)[0]
+    panels = draw_panels(ax, len(others), len(others), (1.0 + 4.5 * len(others), 4.2))
+    figure = figure_of(panels)
     for axes, other in zip(panels, others, strict=True):
         for k, group in enumerate(groups):
             members = [m for m in range(model.n_demos) if labels is None or labels[m] == group]
             dots = axes.scatter(
                 points[members, 0],
                 points[members, other],
-                c=PALETTE[k % len(PALETTE)] if values is None else values,
+                c=line_color(k) if values is None else values,
                 cmap=None if values is None else colormap(),
-                marker=MARKERS[(k + k // len(PALETTE)) % len(MARKERS)],
+                marker=MARKERS[(k + k // len(colors())) % len(MARKERS)],
                 s=36,
                 label=group,
             )
         label_axes(axes, names[0], names[other])
     if values is not None:
-        figure.colorbar(dots, ax=list(panels), label="context")
+        figure.colorbar(dots, ax=panels, label="context")
     elif labels is not None:
-        handles, texts = panels[0].get_legend_handles_labels()
-        figure.legend(handles, texts, loc="outside right upper", frameon=False)
+        legend(panels[0], "outside right upper")
     return figure

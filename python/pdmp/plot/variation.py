@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from pdmp._native import Demonstration
-from pdmp.plot.canvas import GREY, PALETTE, dof_labels, grid_panels, legend
+from pdmp.plot.canvas import GREY, dof_labels, figure_of, grid_panels, legend, line_color
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 PERCENT = np.arange(101.0)
 
@@ -22,7 +23,7 @@ def variation(
     labels: Sequence[str] | None = None,
     *,
     kind: Literal["discrete", "rhythmic"] = "discrete",
-    figure: Figure | None = None,
+    ax: Axes | ArrayLike | None = None,
 ) -> Figure:
     """Draws mean ± standard deviation of each group, over the percentage of movement or cycle.
 
@@ -37,8 +38,8 @@ def variation(
         Group of each demonstration: a person, a condition.
     kind : {"discrete", "rhythmic"}
         A rhythmic demonstration is one cycle, which ends where it begins.
-    figure : matplotlib.figure.Figure, optional
-        Figure to draw on; by default a new one.
+    ax : matplotlib.axes.Axes or array of Axes, optional
+        The panels, or one in whose place they are drawn; by default those of a new figure.
 
     Raises
     ------
@@ -67,7 +68,7 @@ def variation(
     traces = np.stack([_over_percent(demo, kind) for demo in demos])
     names = demos[0].names or [f"y{d}" for d in range(n)]
     x = "cycle [%]" if kind == "rhythmic" else "movement [%]"
-    figure, panels = grid_panels(dof_labels(names, demos[0].units or [""] * n), x, figure)
+    panels = grid_panels(dof_labels(names, demos[0].units or [""] * n), x, ax)
     groups = ["mean ± SD"] if labels is None else list(dict.fromkeys(labels))
     if labels is None:
         for axes, columns in zip(panels, traces.T, strict=True):
@@ -75,13 +76,13 @@ def variation(
     for k, group in enumerate(groups):
         members = [labels is None or labels[m] == group for m in range(len(demos))]
         mean, deviation = traces[members].mean(axis=0), _deviation(traces[members])
-        color, label = PALETTE[k % len(PALETTE)], f"{group} (n = {sum(members)})"
+        color, label = line_color(k), f"{group} (n = {sum(members)})"
         for axes, line, band in zip(panels, mean.T, deviation.T, strict=True):
             axes.plot(PERCENT, line, color=color, label=label)
             axes.fill_between(PERCENT, line - band, line + band, color=color, alpha=0.2, lw=0)
     panels[0].set_xlim(0, 100)
-    legend(figure, panels[0])
-    return figure
+    legend(panels[0])
+    return figure_of(panels)
 
 
 def _deviation(traces: NDArray[Any]) -> NDArray[Any]:

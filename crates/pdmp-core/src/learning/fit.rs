@@ -139,9 +139,10 @@ pub fn fit_with(
     let mut factorising = |share| progress(Stage::Factorise, share);
     let training = Training { aligned: &aligned, targets: &targets, transport: &transport, constants: &constants };
     let factors = training.factors(options, &dof_scale, contexts.as_ref(), &mut factorising)?;
-    findings.extend(noise_findings::noisy(&aligned.noise, &ranges, &names));
+    findings.extend(noise_findings::noisy(&aligned.noise, &ranges, &names, &units));
     let no_units = units.iter().all(String::is_empty);
-    findings.extend(noise_findings::truncation_error(&targets, &factors, &aligned.noise, &names).filter(|_| no_units));
+    let truncated = noise_findings::truncation_error(&targets, &factors, &aligned.noise, &dof_scale, &names);
+    findings.extend(truncated.filter(|_| no_units));
     let Targets { forcing, goals, starts, anchors, .. } = targets;
     drop(forcing);
 

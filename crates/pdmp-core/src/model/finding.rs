@@ -229,7 +229,8 @@ impl fmt::Display for Finding {
             Self::TurnsApart { demo, dof, turns, turn, mended } => {
                 write!(
                     f,
-                    "demo {demo}: {dof:?} lies {turns} full turns of {turn:.4} from that of most demonstrations: "
+                    "demo {demo}: {dof:?} lies {turns} {} of {turn:.4} from that of most demonstrations: ",
+                    if turns.abs() == 1.0 { "full turn" } else { "full turns" }
                 )?;
                 f.write_str(if *mended {
                     "the turns were subtracted; use one range of angles in all recordings to avoid this"

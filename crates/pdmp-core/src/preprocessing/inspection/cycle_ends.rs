@@ -39,6 +39,7 @@ fn ends_of(demo: usize, survey: &Survey) -> Option<Finding> {
         return None;
     }
     let last = survey.n_samples() - 1;
+    let rounding = survey.rounding();
     let mut worst = None;
     let mut max_share = MIN_SHARE;
     // Squared steps from end to start, at both ends, and on average, each relative to the range of its degree of freedom.
@@ -46,7 +47,7 @@ fn ends_of(demo: usize, survey: &Survey) -> Option<Finding> {
     for d in 0..survey.n_dofs {
         let (column, turn) = (survey.column(d), turn_of(survey.demo.units().map_or("", |units| &units[d])));
         let range = range(column.iter());
-        if range == 0.0 {
+        if range <= rounding {
             continue;
         }
         let opening = closing_sign(survey, d) * column[0] - column[last];

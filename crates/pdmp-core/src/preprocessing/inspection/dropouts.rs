@@ -26,7 +26,8 @@ pub(super) fn zeros(demo: usize, survey: &Survey) -> Vec<Finding> {
     if n < MIN_SAMPLES || !survey.zero || survey.step == 0.0 {
         return Vec::new();
     }
-    let mut runs: Vec<Run> = (0..survey.n_dofs).flat_map(|d| runs(d, survey.column(d))).collect();
+    let rounding = survey.rounding();
+    let mut runs: Vec<Run> = (0..survey.n_dofs).flat_map(|d| runs(d, survey.column(d), rounding)).collect();
     // Rows of zeros at the end are padding.
     let all = runs.iter().filter(|run| run.to == n - 1).count() == survey.n_dofs;
     if all {
@@ -44,8 +45,9 @@ pub(super) fn zeros(demo: usize, survey: &Survey) -> Vec<Finding> {
     together.map(finding).collect()
 }
 
-/// Returns the runs of zeros in a column whose steps to and from them are far larger than those elsewhere.
-fn runs(dof: usize, column: ArrayView1<f64>) -> Vec<Run> {
+/// Returns the runs of zeros in a column whose steps to and from them are far larger than those elsewhere, and than rounding
+/// errors.
+fn runs(dof: usize, column: ArrayView1<f64>, rounding: f64) -> Vec<Run> {
     let n = column.len();
     let mut zero_runs: Vec<Run> = Vec::new();
     for (c, _) in column.iter().enumerate().filter(|(_, y)| **y == 0.0) {
@@ -75,7 +77,7 @@ fn runs(dof: usize, column: ArrayView1<f64>) -> Vec<Run> {
         let after = (run.to + 1 < n).then(|| column[run.to + 1].abs());
         let jump = before.into_iter().chain(after).fold(f64::INFINITY, f64::min);
         run.ratio = jump / largest;
-        run.ratio > MAX_RATIO
+        run.ratio > MAX_RATIO && jump > rounding
     });
     zero_runs
 }

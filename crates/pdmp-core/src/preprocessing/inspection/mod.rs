@@ -33,6 +33,10 @@ pub use turns::unwound;
 /// Minimum number of samples for an estimate of the usual step of a degree of freedom.
 const MIN_SAMPLES: usize = 10;
 
+/// Largest rounding error relative to the largest coordinate of a demonstration. A constant computed from others, such as an
+/// angle of a joint that is not tracked, has errors of 3e-16 in recorded BVH files; products of many rotations have more.
+const ROUNDING: f64 = 1e-12;
+
 /// Number of values that are processed in parallel, for vector registers.
 const LANES: usize = 8;
 
@@ -104,6 +108,11 @@ impl<'a> Survey<'a> {
     fn largest_step(&self, d: usize) -> f64 {
         let column = self.column(d);
         (1..column.len()).fold(0.0, |step, c| step.max((column[c] - column[c - 1]).abs()))
+    }
+
+    /// Returns the size of steps that are rounding errors.
+    fn rounding(&self) -> f64 {
+        ROUNDING * self.demo.position().iter().fold(0.0f64, |most, value| most.max(value.abs()))
     }
 
     fn n_samples(&self) -> usize {

@@ -51,20 +51,21 @@ fn ends_in_zeros(survey: &Survey, rows: usize) -> bool {
     if position.row(n - 1).iter().any(|&y| y != 0.0) {
         return false;
     }
-    let movement = n - rows;
+    let (movement, rounding) = (n - rows, survey.rounding());
     (0..survey.n_dofs).any(|d| {
         let column = survey.column(d);
         let largest = (1..movement).fold(0.0f64, |max, c| max.max((column[c] - column[c - 1]).abs()));
-        largest > 0.0 && column[movement - 1].abs() > MAX_RATIO * largest
+        largest > 0.0 && column[movement - 1].abs() > f64::max(MAX_RATIO * largest, rounding)
     })
 }
 
 /// Returns whether a degree of freedom still moves fast in its step to the sample `last`.
 fn stops_abruptly(survey: &Survey, last: usize) -> bool {
+    let rounding = survey.rounding();
     last > 0
         && (0..survey.n_dofs).any(|d| {
             let column = survey.column(d);
             let step = (column[last] - column[last - 1]).abs();
-            step > 0.0 && step > ABRUPT_STEP * survey.largest_step(d)
+            step > rounding && step > ABRUPT_STEP * survey.largest_step(d)
         })
 }
