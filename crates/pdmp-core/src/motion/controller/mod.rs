@@ -11,6 +11,7 @@
 //! than 1/500 of the movement and 1/95 of each transition in progress, else proportionally many substeps, at most 1000.
 
 mod coupling;
+mod forcing;
 mod forecast;
 mod getters;
 mod goal;
