@@ -30,6 +30,7 @@ _Kernel: TypeAlias = Literal["matern32", "matern52"]
 _Order: TypeAlias = Literal["wxyz", "xyzw"]
 
 __all__ = [
+    "AdditionalForcing",
     "Conditions",
     "ContextMap",
     "Controller",
@@ -44,12 +45,14 @@ __all__ = [
     "ModelFileError",
     "NGnet",
     "NGnetRegression",
+    "Passage",
     "PdmpError",
     "Prediction",
     "RolloutChunks",
     "Status",
     "TimeWarp",
     "Trajectory",
+    "ViaPoint",
     "__version__",
     "absolute_relative",
     "axis_angles_to_quaternions",
@@ -1095,6 +1098,17 @@ class Model:
         ----------
         Kelley, Journal of the Society for Industrial and Applied Mathematics 8(4), 1960, doi:10.1137/0108053.
         """
+    def through(
+        self,
+        points: ViaPoint | Sequence[ViaPoint],
+        conditions: Conditions | None = None,
+        *,
+        from_phase: float | None = None,
+        deviation: float | None = None,
+        context: _Context | None = None,
+        **changes: Unpack[_Changes],
+    ) -> Passage:
+        """T."""
     def jacobian(
         self,
         wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
@@ -1641,6 +1655,7 @@ class _Changes(TypedDict, total=False):
     tau: float | None
     segment_durations: ArrayLike | None  # (K,)
     phase: float | None
+    forcing: AdditionalForcing | None
 
 @final
 class Conditions:
@@ -1742,6 +1757,9 @@ class Conditions:
     @property
     def phase(self) -> float | None:
         """Phase φ in rad at which a rhythmic movement starts, or None."""
+    @property
+    def forcing(self) -> AdditionalForcing | None:
+        """T."""
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
@@ -1986,6 +2004,75 @@ class Prediction:
         """
 
 @final
+class ViaPoint:
+    """Point."""
+    def __new__(
+        cls,
+        time: float | None = None,
+        position: ArrayLike | None = None,  # (n,)
+        *,
+        phase: float | None = None,
+        velocity: ArrayLike | None = None,
+        dofs: Sequence[int | str] | None = None,
+        tolerance: float = 0.0,
+    ) -> ViaPoint: ...
+    @property
+    def time(self) -> float | None:
+        """T."""
+    @property
+    def phase(self) -> float | None:
+        """T."""
+    @property
+    def position(self) -> _Array | None:  # (n,)
+        """T."""
+    @property
+    def velocity(self) -> _Array | None:  # (n,)
+        """T."""
+    @property
+    def dofs(self) -> list[int | str] | None:
+        """T."""
+    @property
+    def tolerance(self) -> float:
+        """T."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __getnewargs_ex__(self) -> tuple[Any, ...]: ...
+
+@final
+class AdditionalForcing:
+    """F."""
+    def displacement(self, u: float) -> tuple[_Array, _Array, _Array]:  # each (D,)
+        """T."""
+    @property
+    def begins(self) -> float:
+        """T."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class Passage:
+    """P."""
+    @property
+    def conditions(self) -> Conditions:
+        """T."""
+    @property
+    def forcing(self) -> AdditionalForcing:
+        """T."""
+    @property
+    def distance(self) -> float:
+        """T."""
+    @property
+    def n_constraints(self) -> int:
+        """T."""
+    @property
+    def displacement(self) -> _Array:  # (D,)
+        """T."""
+    @property
+    def far(self) -> bool:
+        """T."""
+
+@final
 class ContextMap:
     """Regression from contexts to outputs with predictive covariance.
 
@@ -2228,6 +2315,11 @@ class Controller:
 
         The movement is unperturbed until the next measurement.
         """
+    @property
+    def forcing(self) -> AdditionalForcing | None:
+        """T."""
+    def add_forcing(self, forcing: AdditionalForcing) -> None:
+        """T."""
     def forecast(self, horizon: float, dt: float | None = None) -> Trajectory:
         """Computes the motion over the next seconds under the present commands, without a change of the controller.
 

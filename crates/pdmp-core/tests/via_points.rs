@@ -224,10 +224,13 @@ fn forcing_joins_a_movement_under_way() {
         let without = run(model, &conditions, 5000, 0, None);
         let with = run(model, &conditions, 700, 0, None);
         let step = |motion: &[[Vec<f64>; 3]], order: usize| {
-            motion.windows(2).flat_map(|pair| {
-                let (a, b) = (pair[0][order].clone(), pair[1][order].clone());
-                a.into_iter().zip(b).zip(model.ranges()).map(|((a, b), r)| (b - a).abs() / r).collect::<Vec<_>>()
-            }).fold(0.0, f64::max)
+            motion
+                .windows(2)
+                .flat_map(|pair| {
+                    let (a, b) = (pair[0][order].clone(), pair[1][order].clone());
+                    a.into_iter().zip(b).zip(model.ranges()).map(|((a, b), r)| (b - a).abs() / r).collect::<Vec<_>>()
+                })
+                .fold(0.0, f64::max)
         };
         for order in 0..3 {
             let (largest, usual) = (step(&with[1..1990], order), step(&without[1..1990], order));
@@ -259,7 +262,8 @@ fn limits_see_the_forcing() {
     let step = duration(&conditions) / STEPS as f64;
     let passage = plain(model, &[ViaPoint::new(At::Time(90.0 * step), wanted.clone())]).unwrap();
     let path = fastest(model.primitive(), &limits, &passage.conditions, 1e-3).unwrap().position;
-    let distance = |row: ndarray::ArrayView1<f64>| row.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let distance =
+        |row: ndarray::ArrayView1<f64>| row.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let nearest = path.rows().into_iter().map(distance).fold(f64::INFINITY, f64::min);
     assert!(nearest < 2e-3, "{nearest}");
 }
@@ -302,7 +306,14 @@ fn batches_snapshots_and_copies_carry_the_forcing() {
         assert_eq!(controller.position(), restored.position());
         let other = if model.kind() == Kind::Discrete { &CYCLE } else { &REACH };
         assert!(Controller::restore(other.primitive(), &snapshot).is_err());
-        assert!(rollout(other.primitive(), &Conditions { forcing: passed.forcing, ..Conditions::default() }, grid(0.01, 1.0)).is_err());
+        assert!(
+            rollout(
+                other.primitive(),
+                &Conditions { forcing: passed.forcing, ..Conditions::default() },
+                grid(0.01, 1.0)
+            )
+            .is_err()
+        );
     }
 }
 

@@ -35,8 +35,7 @@ const HEADER: usize = 5;
 /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
 /// let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
 /// let points = [ViaPoint::new(At::Time(0.4), vec![0.5, 0.2])];
-/// let passage = through(&model, &points, &Conditions::default(), &PassageOptions::default())?;
-/// let forcing = passage.conditions.forcing.expect("it has one");
+/// let forcing = through(&model, &points, &Conditions::default(), &PassageOptions::default())?.forcing;
 /// // The movement begins and ends as without it.
 /// assert_eq!(forcing.displacement(0.0)[0], [0.0; 2]);
 /// assert_eq!(AdditionalForcing::from_numbers(&forcing.to_numbers())?, *forcing);
@@ -273,8 +272,9 @@ mod tests {
     }
 
     fn forcing() -> AdditionalForcing {
-        let knots: Vec<[f64; 3]> =
-            (0..=40).flat_map(|k| [bump(f64::from(k) * 0.05), [0.0; 3], bump(f64::from(k) * 0.05).map(|x| 2.0 * x)]).collect();
+        let knots: Vec<[f64; 3]> = (0..=40)
+            .flat_map(|k| [bump(f64::from(k) * 0.05), [0.0; 3], bump(f64::from(k) * 0.05).map(|x| 2.0 * x)])
+            .collect();
         AdditionalForcing::from_knots(DISCRETE, 3, 0.0, &knots)
     }
 

@@ -85,7 +85,11 @@ impl Request<'_> {
     fn of_dofs(&self, point: &ViaPoint, given: &[usize], v: f64) -> Result<Vec<(usize, Option<f64>, Option<f64>)>> {
         let at = |vector: &Option<Vec<f64>>, i: usize| vector.as_ref().map(|vector| vector[i]);
         let Some(coordinates) = self.primitive.coordinates() else {
-            return Ok(given.iter().enumerate().map(|(i, &d)| (d, at(&point.position, i), at(&point.velocity, i))).collect());
+            return Ok(given
+                .iter()
+                .enumerate()
+                .map(|(i, &d)| (d, at(&point.position, i), at(&point.velocity, i)))
+                .collect());
         };
         if point.velocity.is_some() {
             let problem = "does not apply: a primitive with rotations takes positions of points alone";
@@ -114,7 +118,8 @@ impl Request<'_> {
                 }
             }
         }
-        constrained.extend(coordinates.plain().iter().filter(|[column, _]| given.contains(column)).map(|[_, dof]| *dof));
+        constrained
+            .extend(coordinates.plain().iter().filter(|[column, _]| given.contains(column)).map(|[_, dof]| *dof));
         Ok(constrained.into_iter().map(|dof| (dof, Some(dofs[dof]), None)).collect())
     }
 
@@ -153,7 +158,8 @@ impl Request<'_> {
     /// Returns whether the parameters do not change aᵀθ.
     fn is_fixed(&self, row: &[f64], scale: f64) -> bool {
         let covariance = &self.prior.covariance;
-        let variance: f64 = (0..row.len()).map(|p| row[p] * (0..row.len()).map(|q| covariance[(p, q)] * row[q]).sum::<f64>()).sum();
+        let variance: f64 =
+            (0..row.len()).map(|p| row[p] * (0..row.len()).map(|q| covariance[(p, q)] * row[q]).sum::<f64>()).sum();
         self.from.is_some() || variance <= (FIXED * scale).powi(2)
     }
 
@@ -194,9 +200,11 @@ impl Request<'_> {
     fn mean(&self, v: f64, order: usize, dof: usize) -> f64 {
         let (row, constant) = self.row(v, order, dof);
         let extent = self.prior.canonical.extent();
-        let displaced = self.conditions.forcing.as_ref().map_or(0.0, |forcing| {
-            forcing.displacement(v * extent)[order][dof] * extent.powi(order as i32)
-        });
+        let displaced = self
+            .conditions
+            .forcing
+            .as_ref()
+            .map_or(0.0, |forcing| forcing.displacement(v * extent)[order][dof] * extent.powi(order as i32));
         constant + displaced + row.iter().zip(&self.parameters).map(|(a, b)| a * b).sum::<f64>()
     }
 
@@ -206,7 +214,8 @@ impl Request<'_> {
         let v = match at {
             At::Time(time) => {
                 let last = if kind == Kind::Discrete { self.time.duration() * (1.0 + SAME_PLACE) } else { f64::MAX };
-                let allowed = "seconds must lie between the start and the end of the movement; see tau and segment_durations";
+                let allowed =
+                    "seconds must lie between the start and the end of the movement; see tau and segment_durations";
                 check_range("time", time, (0.0..=last).contains(&time), allowed)?;
                 self.time.phase(time)[0]
             }

@@ -98,9 +98,7 @@ impl Prior<'_> {
                 scaled.cholesky()?
             }
         };
-        let solve = |residual: &DVector<f64>| {
-            factor.solve(&residual.component_div(&scale)).component_div(&scale)
-        };
+        let solve = |residual: &DVector<f64>| factor.solve(&residual.component_div(&scale)).component_div(&scale);
         let residuals = constraints.residuals();
         let mut weights = solve(&residuals);
         let distance = residuals.dot(&weights).max(0.0).sqrt();

@@ -88,6 +88,8 @@ pub struct PassageOptions {
 pub struct Passage {
     /// Conditions of the movement, with its additional forcing.
     pub conditions: Conditions,
+    /// Additional forcing without one that was given.
+    pub forcing: Arc<AdditionalForcing>,
     /// Mahalanobis distance of the points from the movements of the demonstrators.
     pub distance: f64,
     /// Number of positions and velocities; the square of the distance of a movement of the demonstrators is chi-squared with it.
@@ -179,13 +181,14 @@ pub fn through(
         return Err(Error::Argument { name: "points", problem });
     };
     let displacement = largest(&forcing, &scales, canonical.extent());
-    let forcing = match &conditions.forcing {
-        Some(present) => present.plus(&forcing)?,
-        None => forcing,
+    let forcing = Arc::new(forcing);
+    let sum = match &conditions.forcing {
+        Some(present) => Arc::new(present.plus(&forcing)?),
+        None => Arc::clone(&forcing),
     };
     let moved = if from.is_some() { base } else { changed(primitive, base, &request.parameters, change.as_slice()) };
-    let conditions = Conditions { forcing: Some(Arc::new(forcing)), ..moved };
-    Ok(Passage { conditions, distance, n_constraints, displacement })
+    let conditions = Conditions { forcing: Some(sum), ..moved };
+    Ok(Passage { conditions, forcing, distance, n_constraints, displacement })
 }
 
 /// Returns the conditions that the demonstrations or a prediction supply.
@@ -229,8 +232,7 @@ fn covariance(model: &Model, path: &LinearPath, given: &Conditions, options: &Pa
         Some(covariance) => DMatrix::from_fn(n, n, |p, q| covariance[[p, q]]),
         None => {
             let demonstrated = model.demonstrated();
-            let (m, centres) =
-                (model.n_demos(), if discrete { &demonstrated.goals } else { &demonstrated.anchors });
+            let (m, centres) = (model.n_demos(), if discrete { &demonstrated.goals } else { &demonstrated.anchors });
             let deviations = DMatrix::from_fn(m, n, |i, p| match p {
                 p if p < n_styles => demonstrated.styles[[i, p]],
                 p if p < n_styles + n_dofs => centres[[i, p - n_styles]],

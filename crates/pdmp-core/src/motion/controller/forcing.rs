@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Controller, Status};
 use crate::dynamics::additional_forcing::AdditionalForcing;
+use crate::dynamics::goal_transition::FrameSample;
 use crate::error::Result;
 
 impl Controller {
@@ -33,7 +34,7 @@ impl Controller {
     /// let points = [ViaPoint::new(At::Time(0.6), vec![0.6, 0.2])];
     /// let options = PassageOptions { from_phase: Some(controller.phase()), ..PassageOptions::default() };
     /// let passage = through(&model, &points, &conditions, &options)?;
-    /// controller.add_forcing(&passage.conditions.forcing.expect("it has one"))?;
+    /// controller.add_forcing(&passage.forcing)?;
     /// (0..40).try_for_each(|_| controller.step().map(drop))?;
     /// assert!((controller.position()[1] - 0.2).abs() < 1e-6);
     /// # Ok(())
@@ -63,5 +64,19 @@ impl Controller {
         self.look_ahead();
         self.publish();
         Ok(())
+    }
+
+    /// Returns the displacement of a group by an additional forcing at the clock.
+    pub(super) fn additional_frame(&self, index: usize) -> FrameSample {
+        let forcing = self.conditions.forcing.as_deref();
+        forcing.map_or_else(FrameSample::default, |forcing| forcing.sample(index, self.clock.value()))
+    }
+
+    /// Adds the velocity of an additional displacement at the clock, times a factor, to z of every group.
+    pub(super) fn add_additional_slope(&mut self, factor: f64) {
+        for index in 0..self.groups.len() {
+            let slope = self.additional_frame(index).slope;
+            self.groups[index].z += slope * factor;
+        }
     }
 }

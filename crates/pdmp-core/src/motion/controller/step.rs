@@ -4,7 +4,6 @@ use super::group::{ForcingSample, Gate, Group, add_frame_motion};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum, amplitude, faded};
 use crate::dynamics::forcing_table::Fade;
-use crate::dynamics::goal_transition::FrameSample;
 use crate::dynamics::output_system::{CubicSample, State};
 use crate::dynamics::transport::TransportSample;
 use crate::error::{Error, Result};
@@ -308,20 +307,6 @@ impl Controller {
         self.frame_lag = self.transport_segment.lag(self.clock.value()).value;
         for index in 0..self.groups.len() {
             self.groups[index].shift = self.additional_frame(index).value;
-        }
-    }
-
-    /// Returns the displacement of a group by an additional forcing at the clock.
-    pub(super) fn additional_frame(&self, index: usize) -> FrameSample {
-        let forcing = self.conditions.forcing.as_deref();
-        forcing.map_or_else(FrameSample::default, |forcing| forcing.sample(index, self.clock.value()))
-    }
-
-    /// Adds the velocity of an additional displacement at the clock, times a factor, to z of every group.
-    pub(super) fn add_additional_slope(&mut self, factor: f64) {
-        for index in 0..self.groups.len() {
-            let slope = self.additional_frame(index).slope;
-            self.groups[index].z += slope * factor;
         }
     }
 
