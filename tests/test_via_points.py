@@ -77,7 +77,7 @@ def test_given_conditions_and_contexts_hold(model: pdmp.Model) -> None:
 
 
 def test_distant_points_are_said(model: pdmp.Model) -> None:
-    """A warning tells that points are far from the demonstrations."""
+    """Points far from the demonstrations cause a warning."""
     with pytest.warns(UserWarning, match="far from the demonstrations"):
         passage = model.through(pdmp.ViaPoint(0.4, [3.0], dofs=["z"]))
     assert passage.far and passage.distance > 5

@@ -135,7 +135,7 @@ impl Model {
     ///     Phase from which on a movement under way under `conditions` departs from them, such as `Controller.phase`. All
     ///     conditions then remain, and the additional forcing alone leads the movement through the points.
     /// deviation : float, optional
-    ///     Standard deviation of delta relative to the ranges, 0.02 by default. With 0 the conditions carry all that they can,
+    ///     Standard deviation of delta relative to the ranges, 0.03 by default. With 0 the conditions carry all that they can,
     ///     and the additional forcing the least; larger ones bend the movement near the points alone.
     /// context : array_like or list, (Q,), optional
     ///     Context whose prediction supplies mean and covariance of the conditions.

@@ -22,7 +22,7 @@ pub(super) const CELLS: usize = 64;
 /// Error of a constraint, relative to its scale, at which the refinement stops.
 const ACCURACY: f64 = 1e-12;
 /// Maximum number of refinements. Each removes the error that rounding and interpolation leave.
-const MAX_REFINEMENTS: usize = 8;
+const MAX_REFINEMENTS: usize = 20;
 /// Addition to the diagonal of the scaled matrix where rounding makes it indefinite.
 const JITTER: f64 = 1e-13;
 
