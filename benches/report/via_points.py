@@ -30,10 +30,10 @@ TEXT = """\
 # Movements completed from a few points
 
 `make report` prints this table; `PYTHONPATH=benches .venv/bin/python -m report.via_points --write`
-writes it here. Demonstrations are held out in turn, up to {folds} of each task. Of each, one, two or
-four points are given, at equal fractions of the duration (25, 50 or 75 %; 30 and 60 %; 20, 40, 60
-and 80 %). The error of the completed movement is the root mean square over normalised time, relative
-to that of the mean of the other demonstrations, averaged over tasks.
+writes it here. Demonstrations are held out in turn, up to {folds} of each task. Of each, one, two
+or four points are given, at equal fractions of the duration (25, 50 or 75 %; 30 and 60 %; 20, 40,
+60 and 80 %). The error of the completed movement is the root mean square over normalised time,
+relative to that of the mean of the other demonstrations, averaged over tasks.
 
 - *PDMP*: `Model.through` with its defaults.
 - *conditions alone*: with `deviation=0`, the conditions carry all that they can.

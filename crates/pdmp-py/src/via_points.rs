@@ -241,12 +241,12 @@ impl Controller {
     /// >>> controller = model.controller(dt=0.01)
     /// >>> for _ in range(20):
     /// ...     _ = controller.step()
-    /// >>> point = pdmp.ViaPoint(0.6, [0.35], dofs=[1])
+    /// >>> point = pdmp.ViaPoint(0.4, [0.15], dofs=[1])
     /// >>> passage = model.through(point, model.conditions(model.nominal), from_phase=controller.phase)
     /// >>> controller.add_forcing(passage.forcing)
-    /// >>> for _ in range(40):
+    /// >>> for _ in range(20):
     /// ...     _ = controller.step()
-    /// >>> bool(abs(controller.position[1] - 0.35) < 1e-6)
+    /// >>> bool(abs(controller.position[1] - 0.15) < 1e-6)
     /// True
     fn add_forcing(&mut self, forcing: &Bound<'_, PyAny>) -> PyResult<()> {
         let result = self.inner.add_forcing(instance::forcing("forcing", forcing)?);

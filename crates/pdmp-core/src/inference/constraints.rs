@@ -143,7 +143,8 @@ impl Request<'_> {
             if (other.residual - residual).abs() <= SAME_PLACE * scale {
                 return Ok(());
             }
-            return Err(Error::Conflict { names: ["points", "points"], reason: "two of them are at one place" });
+            let problem = "differ at one place: leave one out, or give them a tolerance";
+            return Err(Error::Argument { name: "points", problem });
         }
         let is_end = v <= SAME_PLACE || v >= 1.0 - SAME_PLACE;
         if self.prior.canonical.kind() == Kind::Discrete && is_end && (order > 0 || self.is_fixed(&row, scale)) {
@@ -217,7 +218,7 @@ impl Request<'_> {
                 let allowed =
                     "seconds must lie between the start and the end of the movement; see tau and segment_durations";
                 check_range("time", time, (0.0..=last).contains(&time), allowed)?;
-                self.time.phase(time)[0]
+                self.time.phase(time)[0] + self.conditions.phase / self.prior.canonical.extent()
             }
             At::Phase(phase) => share_at(self.prior.canonical, "phase", phase)?,
         };

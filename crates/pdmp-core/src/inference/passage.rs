@@ -20,7 +20,7 @@ use crate::numerics::matern::Matern52;
 /// Number of cells of a displacement: 13 per length scale.
 pub(super) const CELLS: usize = 64;
 /// Error of a constraint, relative to its scale, at which the refinement stops.
-const ACCURACY: f64 = 1e-12;
+const ACCURACY: f64 = 1e-11;
 /// Maximum number of refinements. Each removes the error that rounding and interpolation leave.
 const MAX_REFINEMENTS: usize = 20;
 /// Addition to the diagonal of the scaled matrix where rounding makes it indefinite.
@@ -102,8 +102,9 @@ impl Prior<'_> {
         let residuals = constraints.residuals();
         let mut weights = solve(&residuals);
         let distance = residuals.dot(&weights).max(0.0).sqrt();
+        // Large weights of opposite sign leave a rounding error in ΣAᵀλ, but not in the sum of its corrections.
+        let mut change = &spread * &weights;
         for refinement in 0.. {
-            let change = &spread * &weights;
             let forcing = self.displacement(constraints, &weights, carries.then_some(&change), from);
             let own = if carries { DVector::zeros(n) } else { &rows * &change };
             let errors = DVector::from_fn(n, |i, _| {
@@ -115,7 +116,9 @@ impl Prior<'_> {
             if !(error > ACCURACY && error.is_finite()) || refinement == MAX_REFINEMENTS {
                 return Some(Passed { change, forcing, distance, error });
             }
-            weights += solve(&errors);
+            let correction = solve(&errors);
+            change += &spread * &correction;
+            weights += correction;
         }
         None
     }
