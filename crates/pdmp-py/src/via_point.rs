@@ -126,7 +126,7 @@ impl ViaPoint {
         let arguments = arguments.into_py_dict(py)?;
         arguments.set_item("position", position)?;
         arguments.set_item("velocity", velocity)?;
-        arguments.set_item("dofs", &self.dofs)?;
+        arguments.set_item("dofs", self.dofs.clone())?;
         Ok(((), arguments))
     }
 

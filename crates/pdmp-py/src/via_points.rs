@@ -24,7 +24,7 @@ use crate::via_point::ViaPoint;
 /// It moves the frame of the movement by delta(u), so that a movement under constant conditions becomes y(u) + delta(u).
 /// That of a discrete movement vanishes at its end, and that of a rhythmic one is periodic. `Conditions.forcing` and
 /// `Controller.add_forcing` take it; it can be pickled.
-#[pyclass(frozen, eq, module = "pdmp", skip_from_py_object)]
+#[pyclass(frozen, eq, module = "pdmp")]
 #[derive(Clone, PartialEq)]
 pub(crate) struct AdditionalForcing(pub(crate) Arc<Forcing>);
 
