@@ -2139,6 +2139,11 @@ class AdditionalForcing:
         -------
         tuple of three ndarray, (D,)
             The displacement in the unit of each degree of freedom, and its first and second derivative per unit of u.
+
+        Raises
+        ------
+        ValueError
+            `u` is not a number.
         """
     @property
     def begins(self) -> float:

@@ -41,6 +41,11 @@ impl AdditionalForcing {
     /// -------
     /// tuple of three ndarray, (D,)
     ///     The displacement in the unit of each degree of freedom, and its first and second derivative per unit of u.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `u` is not a number.
     fn displacement<'py>(&self, py: Python<'py>, u: Scalar<'_>) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>)> {
         let [value, slope, bend] = self.0.displacement(u.number("u")?).map(|jet| to_numpy(py, &jet));
         Ok((value, slope, bend))
