@@ -83,8 +83,9 @@ bench-robots: .venv/with-reproduction  ## Simulated robots under random commands
 bench-poses: .venv/with-reproduction  ## A recorded tool path on a Panda, and a box between the arms of a Baxter, with PDMP_DATA
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m poses
 
-report: .venv/with-test  ## Errors of predictions from contexts, on the recordings in PDMP_DATA; figures into out/report/
+report: .venv/with-test  ## Errors of predictions from contexts and from points, on the recordings in PDMP_DATA; figures into out/report/
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report
+	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report.via_points
 
 # The sanitizer may not touch build scripts, which a named target spares. A compiler without it says why.
 rtsan: | needs  ## Runs the control loop under the real-time sanitizer of a nightly compiler, where there is one

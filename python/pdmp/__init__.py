@@ -17,6 +17,7 @@ from pdmp import io, plot, preprocessing
 from pdmp._limits import Limits
 from pdmp._native import (
     GP,
+    AdditionalForcing,
     Conditions,
     ContextMap,
     Controller,
@@ -29,12 +30,14 @@ from pdmp._native import (
     ModelFileError,
     NGnet,
     NGnetRegression,
+    Passage,
     PdmpError,
     Prediction,
     RolloutChunks,
     Status,
     TimeWarp,
     Trajectory,
+    ViaPoint,
     __version__,
     blend,
     factorise,
@@ -63,6 +66,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "GP",
+    "AdditionalForcing",
     "Conditions",
     "ContextMap",
     "Controller",
@@ -77,6 +81,7 @@ __all__ = [
     "NGnet",
     "NGnetRegression",
     "PacedLoop",
+    "Passage",
     "PdmpError",
     "Prediction",
     "RolloutChunks",
@@ -84,6 +89,7 @@ __all__ = [
     "Tick",
     "TimeWarp",
     "Trajectory",
+    "ViaPoint",
     "__version__",
     "blend",
     "datasets",

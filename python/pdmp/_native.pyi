@@ -30,6 +30,7 @@ _Kernel: TypeAlias = Literal["matern32", "matern52"]
 _Order: TypeAlias = Literal["wxyz", "xyzw"]
 
 __all__ = [
+    "AdditionalForcing",
     "Conditions",
     "ContextMap",
     "Controller",
@@ -44,12 +45,14 @@ __all__ = [
     "ModelFileError",
     "NGnet",
     "NGnetRegression",
+    "Passage",
     "PdmpError",
     "Prediction",
     "RolloutChunks",
     "Status",
     "TimeWarp",
     "Trajectory",
+    "ViaPoint",
     "__version__",
     "absolute_relative",
     "axis_angles_to_quaternions",
@@ -1095,6 +1098,68 @@ class Model:
         ----------
         Kelley, Journal of the Society for Industrial and Applied Mathematics 8(4), 1960, doi:10.1137/0108053.
         """
+    def through(
+        self,
+        points: ViaPoint | Sequence[ViaPoint],
+        conditions: Conditions | None = None,
+        *,
+        from_phase: float | None = None,
+        deviation: float | None = None,
+        context: _Context | None = None,
+        **changes: Unpack[_Changes],
+    ) -> Passage:
+        """Computes the most probable movement through points.
+
+        A movement of the demonstrators is y(u) = Phi(u) theta + delta(u), with style, goal and start theta, or style and
+        anchor, as scattered as those of the demonstrations, and a residual delta of zero mean with a Matérn-5/2 covariance. The
+        result is the mean given the points: conditions, and the residual as additional forcing. Points without tolerance are
+        passed to 1e-9 of the range; a rhythmic movement passes them on its limit cycle, in every period. A warning says that
+        the points are far from the demonstrations.
+
+        Parameters
+        ----------
+        points : ViaPoint, or sequence of ViaPoint
+            Points, with at most 500 positions and velocities.
+        conditions : Conditions, optional
+            Conditions that remain. The others follow from the demonstrations, or from the context.
+        from_phase : float, optional
+            Phase from which on a movement under way under `conditions` departs from them, such as `Controller.phase`. All
+            conditions then remain, and the additional forcing alone leads the movement through the points.
+        deviation : float, optional
+            Standard deviation of delta relative to the ranges, 0.03 by default. With 0 the conditions carry all that they can,
+            and the additional forcing the least; larger ones bend the movement near the points alone.
+        context : array_like or list, (Q,), optional
+            Context whose prediction supplies mean and covariance of the conditions.
+        **changes
+            Single conditions by name, as in `rollout`.
+
+        Returns
+        -------
+        Passage
+            Conditions for `rollout` and `controller`, and the distance of the points from the demonstrations.
+
+        Raises
+        ------
+        ValueError
+            There is no point, or one outside of the movement, at a fixed end or before `from_phase`; a length is wrong; a
+            number is not finite; a tolerance or `deviation` is negative; or points contradict each other.
+
+        Warns
+        -----
+        UserWarning
+            The points are far from the demonstrations.
+
+        Examples
+        --------
+        >>> passage = model.through(pdmp.ViaPoint(0.4, [0.2], dofs=[1]))
+        >>> trajectory = model.rollout(passage.conditions, dt=0.1)
+        >>> bool(abs(trajectory.position[4, 1] - 0.2) < 1e-9)
+        True
+
+        References
+        ----------
+        Paraschos, Daniel, Peters, Neumann, Autonomous Robots 42 (2018), doi:10.1007/s10514-017-9648-7 (via-points of ProMPs).
+        """
     def jacobian(
         self,
         wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
@@ -1642,6 +1707,7 @@ class _Changes(TypedDict, total=False):
     tau: float | None
     segment_durations: ArrayLike | None  # (K,)
     phase: float | None
+    forcing: AdditionalForcing | None
 
 @final
 class Conditions:
@@ -1679,6 +1745,8 @@ class Conditions:
         phase.
     phase : float, optional
         Phase φ in rad at which a rhythmic movement starts on its limit cycle; 0 by default.
+    forcing : AdditionalForcing, optional
+        Additional forcing, which displaces the movement; see `Model.through`.
 
     Raises
     ------
@@ -1744,6 +1812,9 @@ class Conditions:
     @property
     def phase(self) -> float | None:
         """Phase φ in rad at which a rhythmic movement starts, or None."""
+    @property
+    def forcing(self) -> AdditionalForcing | None:
+        """Additional forcing, or None."""
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
@@ -1988,6 +2059,126 @@ class Prediction:
         """
 
 @final
+class ViaPoint:
+    """Point that a movement passes at a time or a phase.
+
+    Parameters
+    ----------
+    time : float, optional
+        Time since the start in s; either this or `phase`.
+    position : array_like, (n,), optional
+        Position in the unit of each degree of freedom, one number for each of `dofs`.
+    phase : float, optional
+        Phase x of a discrete movement, in rad of a rhythmic one, as `Controller.phase`.
+    velocity : array_like, (n,), optional
+        Velocity per s, one number for each of `dofs`.
+    dofs : sequence of int or str, optional
+        Indices or names of the n degrees of freedom, or of coordinates if the model has rotations; all by default. A rotation
+        has all four coordinates or none, and no velocity.
+    tolerance : float
+        Standard deviation of the point relative to the range of each degree of freedom; a point with 0 is passed exactly.
+
+    Raises
+    ------
+    ValueError
+        `time` and `phase` are both given or both absent, or a value is not a number or a vector of numbers. `Model.through`
+        checks the others.
+
+    Examples
+    --------
+    >>> pdmp.ViaPoint(0.4, [0.2], dofs=[1])
+    pdmp.ViaPoint(time=0.4, position=[0.2], dofs=[1])
+    """
+    def __new__(
+        cls,
+        time: float | None = None,
+        position: ArrayLike | None = None,  # (n,)
+        *,
+        phase: float | None = None,
+        velocity: ArrayLike | None = None,
+        dofs: Sequence[int | str] | None = None,
+        tolerance: float = 0.0,
+    ) -> ViaPoint: ...
+    @property
+    def time(self) -> float | None:
+        """Time since the start in s, or None."""
+    @property
+    def phase(self) -> float | None:
+        """Phase, or None."""
+    @property
+    def position(self) -> _Array | None:  # (n,)
+        """Position (n,), or None."""
+    @property
+    def velocity(self) -> _Array | None:  # (n,)
+        """Velocity (n,) per s, or None."""
+    @property
+    def dofs(self) -> list[int | str] | None:
+        """Indices or names of the degrees of freedom, or None for all."""
+    @property
+    def tolerance(self) -> float:
+        """Standard deviation relative to the ranges."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __getnewargs_ex__(self) -> tuple[Any, ...]: ...
+
+@final
+class AdditionalForcing:
+    """Additional forcing of one movement, which displaces it; see `Model.through`.
+
+    It moves the frame of the movement by delta(u), so that a movement under constant conditions becomes y(u) + delta(u).
+    That of a discrete movement vanishes at its end, and that of a rhythmic one is periodic. `Conditions.forcing` and
+    `Controller.add_forcing` take it; it can be pickled.
+    """
+    def displacement(self, u: float) -> tuple[_Array, _Array, _Array]:  # each (D,)
+        """Returns the displacement and its derivatives at a clock.
+
+        Parameters
+        ----------
+        u : float
+            Clock, t / tau since the start, or the phase of a rhythmic movement.
+
+        Returns
+        -------
+        tuple of three ndarray, (D,)
+            The displacement in the unit of each degree of freedom, and its first and second derivative per unit of u.
+
+        Raises
+        ------
+        ValueError
+            `u` is not a number.
+        """
+    @property
+    def begins(self) -> float:
+        """Clock u at which the displacement begins."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class Passage:
+    """Movement through points, returned by `Model.through`."""
+    @property
+    def conditions(self) -> Conditions:
+        """Conditions of the movement, with its additional forcing."""
+    @property
+    def forcing(self) -> AdditionalForcing:
+        """Additional forcing, which `Controller.add_forcing` adds to a movement under way."""
+    @property
+    def distance(self) -> float:
+        """Mahalanobis distance of the points from the movements of the demonstrators. Its square is chi-squared distributed
+        with `n_constraints` degrees of freedom for their movements.
+        """
+    @property
+    def n_constraints(self) -> int:
+        """Number of positions and velocities."""
+    @property
+    def displacement(self) -> _Array:  # (D,)
+        """Largest displacement (D,) by the additional forcing, relative to the ranges."""
+    @property
+    def far(self) -> bool:
+        """True if the points lie farther from the demonstrations than 999 of 1000 movements of the demonstrators would."""
+
+@final
 class ContextMap:
     """Regression from contexts to outputs with predictive covariance.
 
@@ -2229,6 +2420,39 @@ class Controller:
         """Discards the measured position.
 
         The movement is unperturbed until the next measurement.
+        """
+    @property
+    def forcing(self) -> AdditionalForcing | None:
+        """Additional forcing in force, or None."""
+    def add_forcing(self, forcing: AdditionalForcing) -> None:
+        """Adds an additional forcing to that in force.
+
+        Position and velocity stay continuous, and the acceleration too if the forcing begins at the present phase or later
+        (`from_phase` of `Model.through`); one that began earlier is joined as a goal that has moved. Before the first tick it
+        acts from the start. `reset` ends it.
+
+        Parameters
+        ----------
+        forcing : AdditionalForcing
+            Forcing of `Model.through`, as `Passage.forcing`.
+
+        Raises
+        ------
+        ValueError
+            The forcing belongs to another model, or is the ninth with another beginning. The movement then continues.
+
+        Examples
+        --------
+        >>> controller = model.controller(dt=0.01)
+        >>> for _ in range(20):
+        ...     _ = controller.step()
+        >>> point = pdmp.ViaPoint(0.4, [0.15], dofs=[1])
+        >>> passage = model.through(point, model.conditions(model.nominal), from_phase=controller.phase)
+        >>> controller.add_forcing(passage.forcing)
+        >>> for _ in range(20):
+        ...     _ = controller.step()
+        >>> bool(abs(controller.position[1] - 0.15) < 1e-6)
+        True
         """
     def forecast(self, horizon: float, dt: float | None = None) -> Trajectory:
         """Computes the motion over the next seconds under the present commands, without a change of the controller.

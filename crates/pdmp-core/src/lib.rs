@@ -70,6 +70,7 @@ pub mod context;
 pub mod demonstration;
 pub mod dynamics;
 mod error;
+pub mod inference;
 mod kind;
 #[cfg(feature = "learning")]
 pub mod learning;

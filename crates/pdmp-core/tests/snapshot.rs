@@ -181,5 +181,5 @@ fn snapshots_of_other_models_are_rejected() {
     assert!(message(&CYCLE, &snapshot).contains("another model"));
     let mut other = snapshot.clone();
     other[0] = 1.0;
-    assert_eq!(message(&REACH, &other), "snapshot version = 1: must be 2");
+    assert_eq!(message(&REACH, &other), "snapshot version = 1: must be 3");
 }

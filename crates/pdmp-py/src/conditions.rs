@@ -11,10 +11,22 @@ use crate::convert::{read_only, vector};
 use crate::error::{ascii, raise};
 use crate::instance;
 use crate::scalar::{Scalar, number};
+use crate::via_points::AdditionalForcing;
 
 /// Names of all conditions, which are their keywords.
-const NAMES: [&str; 10] =
-    ["style", "goal", "start", "velocity", "goal_velocity", "anchor", "amplitude", "tau", "segment_durations", "phase"];
+const NAMES: [&str; 11] = [
+    "style",
+    "goal",
+    "start",
+    "velocity",
+    "goal_velocity",
+    "anchor",
+    "amplitude",
+    "tau",
+    "segment_durations",
+    "phase",
+    "forcing",
+];
 
 /// Conditions of a movement.
 ///
@@ -50,6 +62,8 @@ const NAMES: [&str; 10] =
 ///     phase.
 /// phase : float, optional
 ///     Phase φ in rad at which a rhythmic movement starts on its limit cycle; 0 by default.
+/// forcing : AdditionalForcing, optional
+///     Additional forcing, which displaces the movement; see `Model.through`.
 ///
 /// Raises
 /// ------
@@ -75,7 +89,7 @@ impl Conditions {
     #[pyo3(
         signature = (**conditions),
         text_signature = "(*, style=None, goal=None, start=None, velocity=None, goal_velocity=None, anchor=None, amplitude=None, \
-                          tau=None, segment_durations=None, phase=None)"
+                          tau=None, segment_durations=None, phase=None, forcing=None)"
     )]
     fn new(conditions: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         crate::labelled::reject(conditions)?;
@@ -164,6 +178,12 @@ impl Conditions {
         self.0.phase
     }
 
+    /// Additional forcing, or None.
+    #[getter]
+    fn forcing(&self) -> Option<AdditionalForcing> {
+        self.0.forcing.clone().map(AdditionalForcing)
+    }
+
     fn __getnewargs_ex__<'py>(slf: &Bound<'py, Self>) -> PyResult<((), Bound<'py, PyDict>)> {
         Ok(((), present(slf)?))
     }
@@ -225,6 +245,18 @@ pub(crate) fn predicted_conditions_of(
     context: Option<&Bound<'_, PyAny>>,
     changes: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(Inner, Option<Prediction>)> {
+    let (own, prediction) = own_and_predicted(model, conditions, context, changes)?;
+    let predicted = prediction.as_ref().map(|prediction| prediction.conditions.clone()).unwrap_or_default();
+    Ok((own.or(predicted), prediction))
+}
+
+/// Returns `conditions` with `changes`, and the prediction for the context, if there is one.
+pub(crate) fn own_and_predicted(
+    model: &pdmp_core::Model,
+    conditions: Option<&Bound<'_, PyAny>>,
+    context: Option<&Bound<'_, PyAny>>,
+    changes: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(Inner, Option<Prediction>)> {
     let base = match conditions {
         None => Inner::default(),
         Some(object) => instance::conditions("conditions", object)?.clone(),
@@ -233,7 +265,7 @@ pub(crate) fn predicted_conditions_of(
     let Some(context) = context else { return Ok((own, None)) };
     reject_style(own.style.is_some())?;
     let prediction = model.predict(&crate::named_contexts::context_for(model, context)?).map_err(raise)?;
-    Ok((own.or(prediction.conditions.clone()), Some(prediction)))
+    Ok((own, Some(prediction)))
 }
 
 /// Rejects a style beside a context.
@@ -267,6 +299,10 @@ pub(crate) fn changed(mut conditions: Inner, changes: Option<&Bound<'_, PyDict>>
                 conditions.tau.take_if(|_| is_absent(changes, "tau") && value.is_some());
             }
             "phase" => conditions.phase = scalar("phase")?,
+            "forcing" => {
+                let forcing = value.as_ref().map(|value| instance::forcing("forcing", value).cloned());
+                conditions.forcing = forcing.transpose()?;
+            }
             _ => {
                 let text = format!("unexpected keyword argument '{name}'; conditions are {}", NAMES.join(", "));
                 return Err(PyTypeError::new_err(ascii(&text)));

@@ -8,6 +8,8 @@ use crate::conditions::Conditions;
 use crate::convert::quoted;
 use crate::demonstration::Demonstration;
 use crate::limits::Limits;
+use crate::via_point::ViaPoint;
+use crate::via_points::AdditionalForcing;
 
 /// Returns the recording that an argument holds.
 pub(crate) fn demonstration<'a>(name: &str, value: &'a Bound<'_, PyAny>) -> PyResult<&'a pdmp_core::Demonstration> {
@@ -24,6 +26,19 @@ pub(crate) fn conditions<'a>(name: &str, value: &'a Bound<'_, PyAny>) -> PyResul
 /// Returns the limits that an argument holds.
 pub(crate) fn limits<'a>(value: &'a Bound<'_, PyAny>) -> PyResult<&'a pdmp_core::motion::Limits> {
     instance("limits", value, "pdmp.Limits").map(|limits: &Limits| &limits.0)
+}
+
+/// Returns the point that an argument holds.
+pub(crate) fn via_point<'a>(name: &str, value: &'a Bound<'_, PyAny>) -> PyResult<&'a ViaPoint> {
+    instance(name, value, "pdmp.ViaPoint")
+}
+
+/// Returns the additional forcing that an argument holds.
+pub(crate) fn forcing<'a>(
+    name: &str,
+    value: &'a Bound<'_, PyAny>,
+) -> PyResult<&'a std::sync::Arc<pdmp_core::dynamics::AdditionalForcing>> {
+    instance(name, value, "pdmp.AdditionalForcing").map(|forcing: &AdditionalForcing| &forcing.0)
 }
 
 fn instance<'a, T>(name: &str, value: &'a Bound<'_, PyAny>, expected: &str) -> PyResult<&'a T>

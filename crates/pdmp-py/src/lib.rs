@@ -35,6 +35,8 @@ mod scalar;
 mod status;
 mod trajectory;
 mod two_arms;
+mod via_point;
+mod via_points;
 mod warp;
 
 use pyo3::prelude::*;
@@ -62,6 +64,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<limits::Limits>()?;
     module.add_class::<feasibility::Margins>()?;
     module.add_class::<prediction::Prediction>()?;
+    module.add_class::<via_point::ViaPoint>()?;
+    module.add_class::<via_points::AdditionalForcing>()?;
+    module.add_class::<via_points::Passage>()?;
     module.add_class::<status::Status>()?;
     module.add_class::<controller::Controller>()?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;

@@ -1,6 +1,7 @@
 //! Dynamical systems of a primitive: canonical system, output system, forcing term, transport, time warp and command
 //! filters.
 
+pub(crate) mod additional_forcing;
 pub(crate) mod braking;
 pub(crate) mod canonical;
 pub(crate) mod command_filter;
@@ -13,6 +14,7 @@ pub(crate) mod propagator_series;
 pub(crate) mod time_warp;
 pub(crate) mod transport;
 
+pub use additional_forcing::AdditionalForcing;
 pub use canonical::Canonical;
 pub use forcing_table::ForcingTable;
 pub use output_system::Attractor;

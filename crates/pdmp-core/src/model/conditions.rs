@@ -1,5 +1,8 @@
 //! Conditions under which a movement starts.
 
+use std::sync::Arc;
+
+use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -41,6 +44,8 @@ pub struct Conditions {
     pub segment_durations: Option<Vec<f64>>,
     /// Phase φ at which a rhythmic movement starts, in rad: on its limit cycle, with nothing to die away; otherwise 0.
     pub phase: Option<f64>,
+    /// Additional forcing, which displaces the movement; otherwise none.
+    pub forcing: Option<Arc<AdditionalForcing>>,
 }
 
 impl Conditions {
@@ -61,6 +66,7 @@ impl Conditions {
             tau,
             segment_durations,
             phase: self.phase.or(other.phase),
+            forcing: self.forcing.or(other.forcing),
         }
     }
 
@@ -107,6 +113,7 @@ impl Conditions {
             tau: number("tau", self.tau, other.tau)?,
             segment_durations: vector("segment_durations", &self.segment_durations, &other.segment_durations)?,
             phase: number("phase", self.phase, other.phase)?,
+            forcing: blend_forcing(&self.forcing, &other.forcing, share)?,
         })
     }
 
@@ -154,6 +161,9 @@ impl Conditions {
             None => nominal.style.clone(),
         };
         self.phase.map_or(Ok(()), |phase| check_phase(kind, phase))?;
+        if let Some(forcing) = &self.forcing {
+            forcing.check(primitive.canonical(), primitive.n_dofs())?;
+        }
         Ok(ResolvedConditions {
             style,
             centre,
@@ -165,6 +175,7 @@ impl Conditions {
             amplitude,
             tau,
             phase: turn(self.phase.unwrap_or(0.0)),
+            forcing: self.forcing.clone(),
         })
     }
 
@@ -219,6 +230,7 @@ pub(crate) struct ResolvedConditions {
     pub(crate) tau: f64,
     /// φ in [0, 2π); 0 where discrete.
     pub(crate) phase: f64,
+    pub(crate) forcing: Option<Arc<AdditionalForcing>>,
 }
 
 clone_in_place!(ResolvedConditions {
@@ -232,7 +244,23 @@ clone_in_place!(ResolvedConditions {
     amplitude,
     tau,
     phase,
+    forcing,
 });
+
+/// Returns the displacement (1 − share)·a + share·b; an absent forcing is zero.
+fn blend_forcing(
+    a: &Option<Arc<AdditionalForcing>>,
+    b: &Option<Arc<AdditionalForcing>>,
+    share: f64,
+) -> Result<Option<Arc<AdditionalForcing>>> {
+    let part = |forcing: &Option<Arc<AdditionalForcing>>, share: f64| {
+        forcing.as_deref().filter(|_| share != 0.0).map(|forcing| forcing.clone().scaled(share))
+    };
+    Ok(match (part(a, 1.0 - share), part(b, share)) {
+        (Some(a), Some(b)) => Some(Arc::new(a.plus(&b)?)),
+        (one, other) => one.or(other).map(Arc::new),
+    })
+}
 
 /// Refuses an argument that this kind of primitive does not have.
 pub(crate) fn reject_for_kind(kind: Kind, name: &'static str, given: bool) -> Result<()> {

@@ -119,6 +119,11 @@ impl Coordinates {
         &self.rotations
     }
 
+    /// Returns column and DoF of each coordinate outside of rotations.
+    pub(crate) fn plain(&self) -> &[[usize; 2]] {
+        &self.plain
+    }
+
     /// Returns the number of coordinates.
     pub fn n_coordinates(&self) -> usize {
         self.names.len()

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ndarray::Array2;
 
+use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::error::{Error, Result};
 
 /// Maximum number of responses in the cache of a primitive.
@@ -67,6 +68,21 @@ impl Responses {
     /// Returns the responses of one derivative.
     pub(crate) fn of(&self, derivative: Derivative) -> &Curves {
         &self.0[derivative as usize]
+    }
+
+    /// Returns the responses with the displacement by an additional forcing as those of one more style; `step` is the interval of
+    /// the samples on the clock, and `rate` that of the clock per second.
+    pub(crate) fn with_forcing(&self, forcing: &AdditionalForcing, step: f64, rate: f64) -> Self {
+        let mut extended = self.clone();
+        let mut curves = [(); 3].map(|()| Array2::zeros(self.0[0].start.dim()));
+        for k in 0..curves[0].nrows() {
+            for (order, jet) in forcing.displacement(k as f64 * step).into_iter().enumerate() {
+                let scale = rate.powi(order as i32);
+                curves[order].row_mut(k).iter_mut().zip(jet).for_each(|(to, x)| *to = scale * x);
+            }
+        }
+        extended.0.iter_mut().zip(curves).for_each(|(all, curve)| all.styles.push(curve));
+        extended
     }
 
     fn bytes(&self) -> usize {

@@ -57,6 +57,8 @@ pub struct Batch {
     velocities: Option<PerMovement>,
     goal_velocities: Option<PerMovement>,
     amplitude: f64,
+    /// True if the last curves of the responses are the displacement by an additional forcing.
+    is_forced: bool,
     /// Primitive with rotations, sampling interval in s, and rate 1/τ.
     pose: Option<(Arc<Primitive>, f64, f64)>,
 }
@@ -79,10 +81,15 @@ pub fn batch(
         None => conditions,
     };
     let n_movements = conditions.check(primitive)?;
-    let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau } = conditions;
+    let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau, forcing } = conditions;
     let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;
+    let mut responses = responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?;
+    if let Some(forcing) = &forcing {
+        responses = Arc::new(responses.with_forcing(forcing, grid.dt / nominal.tau, 1.0 / nominal.tau));
+    }
     Ok(Batch {
-        responses: responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?,
+        responses,
+        is_forced: forcing.is_some(),
         n_movements,
         styles: style.unwrap_or(PerMovement::All(nominal.style)),
         centres: goal.or(anchor).unwrap_or(PerMovement::All(nominal.centre)),
@@ -271,7 +278,8 @@ impl Batch {
 
     /// Returns the coefficients of movement `b`.
     fn combination(&self, b: usize) -> Combination {
-        let style: Vec<f64> = self.styles.row(b).iter().map(|s| self.amplitude * s).collect();
+        let displacement = self.is_forced.then_some(1.0);
+        let style: Vec<f64> = self.styles.row(b).iter().map(|s| self.amplitude * s).chain(displacement).collect();
         let centre = self.centres.row(b).to_vec();
         // Difference of a condition from its value at the start of the sum of the styles.
         let difference = |condition: &Option<PerMovement>, derivative: Derivative, centre: &[f64]| match condition {

@@ -1,7 +1,10 @@
 //! Conditions of the movements of a batch.
 
+use std::sync::Arc;
+
 use ndarray::{Array2, ArrayView1, aview1};
 
+use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::Coordinates;
@@ -43,6 +46,8 @@ pub struct BatchConditions {
     pub amplitude: Option<f64>,
     /// Common time constant τ, in seconds.
     pub tau: Option<f64>,
+    /// Common additional forcing. The default is none.
+    pub forcing: Option<Arc<AdditionalForcing>>,
 }
 
 impl BatchConditions {
@@ -65,7 +70,7 @@ impl BatchConditions {
     /// A phase other than 0, or durations of several segments.
     pub fn shared(primitive: &Primitive, conditions: Conditions) -> Result<Self> {
         let tau = time_constant(primitive, &conditions)?;
-        let Conditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, .. } = conditions;
+        let Conditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, forcing, .. } = conditions;
         let all = |vector: Option<Vec<f64>>| vector.map(PerMovement::All);
         Ok(Self {
             style: all(style),
@@ -76,6 +81,7 @@ impl BatchConditions {
             goal_velocity: all(goal_velocity),
             amplitude,
             tau,
+            forcing,
         })
     }
 
@@ -133,6 +139,7 @@ impl BatchConditions {
             goal_velocity: optional("goal_velocity", (n_dofs, "DoF"), None, |one| &one.goal_velocity)?,
             amplitude: common("amplitude", &amplitudes, 1.0)?,
             tau: common("tau", &taus, primitive.tau)?,
+            forcing: common_forcing(conditions)?,
         })
     }
 
@@ -189,6 +196,9 @@ impl BatchConditions {
         reject_for_kind(kind, "anchor", kind == Kind::Discrete && self.anchor.is_some())?;
         reject_for_kind(kind, "goal", kind == Kind::Rhythmic && self.goal.is_some())?;
         reject_goal_velocity(primitive, self.goal_velocity.is_some())?;
+        if let Some(forcing) = &self.forcing {
+            forcing.check(primitive.canonical(), n_dofs)?;
+        }
         let vectors = [
             ("style", &self.style),
             ("goal", &self.goal),
@@ -256,6 +266,16 @@ fn common(name: &'static str, values: &[Option<f64>], default: f64) -> Result<Op
         });
     }
     Ok(values.iter().any(Option::is_some).then_some(first))
+}
+
+/// Returns the common additional forcing.
+fn common_forcing(conditions: &[Conditions]) -> Result<Option<Arc<AdditionalForcing>>> {
+    let forcing = conditions.first().and_then(|first| first.forcing.clone());
+    if conditions.iter().any(|each| each.forcing != forcing) {
+        let problem = "differs between the movements: a batch has one; compute rollouts one by one";
+        return Err(Error::Argument { name: "forcing", problem });
+    }
+    Ok(forcing)
 }
 
 /// Checks that rows have `expected` finite elements, one per `per`.

@@ -113,7 +113,7 @@ impl Controller {
         }
         let ends = |i: usize, displacement: F64x4, planned: TransitionEnd| {
             let group = &self.groups[i];
-            let frame = present[i] + group.displacement * self.frame_lag + displacement;
+            let frame = present[i] + group.displacement * self.frame_lag + displacement + group.shift;
             let (own, own_end) =
                 (primitive.state(here, &since_knot, i, style), primitive.state(end, &at_knot, i, style));
             let deviation = State { e: self.position[i] - frame - own.e, z: group.z - own.z };

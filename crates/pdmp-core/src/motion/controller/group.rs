@@ -17,6 +17,8 @@ pub(super) struct Group {
     pub(super) z: F64x4,
     /// Displacement g − y₀ of the frame from start to goal; zero for a rhythmic movement.
     pub(super) displacement: F64x4,
+    /// Displacement δ by an additional forcing at the clock.
+    pub(super) shift: F64x4,
     /// Length that the tolerance of a settled movement is relative to.
     pub(super) length: F64x4,
     /// Rounding error of the distance from the goal.
@@ -43,9 +45,9 @@ impl Group {
 
     /// Visits the state, with the bounds of a quantity in units of a DoF and the largest distance from start to goal.
     pub(super) fn walk(&mut self, visit: &mut Visitor, quantity: [f64; 2], distance: f64) -> Result<()> {
-        let Self { forcing, w, z, displacement, length, rounding, range: _ } = self;
+        let Self { forcing, w, z, displacement, shift, length, rounding, range: _ } = self;
         let ForcingSample { value, slope, style_slope } = forcing;
-        for lanes in [value, slope, style_slope, &mut w.value, &mut w.slope, z, length, rounding] {
+        for lanes in [value, slope, style_slope, &mut w.value, &mut w.slope, z, shift, length, rounding] {
             visit(lanes.as_mut_array(), quantity)?;
         }
         visit(displacement.as_mut_array(), [-distance, distance])

@@ -3,14 +3,15 @@
 //! Over a tick the forcing w, the centre and the clock are given by values and slopes at both ends; the cubics between them
 //! are propagated exactly ([`crate::dynamics::Attractor`]). Style, anchor and amplitude pass critically damped filters on
 //! the clock, the rate ρ = 1/τ one in seconds, so that position and velocity stay continuous: ẏ = ρy′ and ÿ = ρ²y″ + ρ̇y′
-//! with y′ = z + w + c′. The frame c of a discrete movement, transport and transition to a new goal (`goal`), is evaluated
-//! exactly at both ends of a tick and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows
+//! with y′ = z + w + c′. The frame c, transport, transition to a new goal (`goal`) and additional forcing (`forcing`), is
+//! evaluated exactly at both ends of a tick and is not propagated. A perturbation ([`Command::measured`], [`Command::coupling`]) slows
 //! the clock of the phase relative to that of the output system, and adds to ẏ and ÿ.
 //!
-//! [`Controller::update`] and the setters neither allocate nor lock nor panic. A tick costs O(J·D): one step if it is shorter
-//! than 1/500 of the movement and 1/95 of each transition in progress, else proportionally many substeps, at most 1000.
+//! [`Controller::update`] and the setters neither allocate nor lock nor panic. A tick costs O(J·D): one step if shorter than
+//! 1/500 of the movement and 1/95 of each transition in progress, else proportionally many substeps, at most 1000.
 
 mod coupling;
+mod forcing;
 mod forecast;
 mod getters;
 mod goal;
@@ -56,7 +57,7 @@ use pose::Pose;
 /// Maximum clock step of a substep, relative to the extent of the movement.
 const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
 /// Default tolerance of a settled movement, relative to the range of each DoF. On the recordings of `docs/transport.md`,
-/// movements settle to it within 1.0 to 1.3 durations (median of a set), to 1e-3 within up to 1.5.
+/// movements settle to it within 1.0 to 1.3 durations (medians), to 1e-3 within up to 1.5.
 const DEFAULT_TOLERANCE: f64 = 5e-3;
 /// Rate of an unlimited speed, relative to the nominal one.
 const MAX_SPEED: f64 = 100.0;
@@ -146,7 +147,6 @@ pub struct Controller {
     idle_governor: Option<Box<Governor>>,
     /// ρ̇ of the next substep where the limits determine it.
     rate_slope: Option<f64>,
-    /// k_φ.
     phase_gain: f64,
     /// Maximum clock step of a substep.
     max_clock_step: f64,

@@ -84,10 +84,13 @@ impl Controller {
             return Ok(());
         }
         self.move_rotations(phase);
-        let r = self.r;
+        let (r, phase_rate) = (self.r, self.perturbation.phase_rate());
+        self.add_additional_slope(phase_rate);
         self.groups.iter_mut().for_each(|group| group.z += group.forcing.value * r);
         self.clock = CompensatedSum::at(phase);
+        self.read_frame();
         self.read_forcing();
+        self.add_additional_slope(-phase_rate);
         self.groups.iter_mut().for_each(|group| group.z -= group.forcing.value * r);
         self.leave_path();
         self.publish();

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use super::group::Gate;
 use super::turning::walk_turning;
 use super::{Controller, Status};
+use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::dynamics::command_filter::FilterStep;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -21,7 +22,7 @@ use crate::numerics::state::{Visitor, visit_flag, visit_number};
 use crate::validate::MAX_MAGNITUDE;
 
 /// Version of the snapshot; a change of `walk` increments it.
-const VERSION: f64 = 2.0;
+const VERSION: f64 = 3.0;
 /// Length of the header: version, numbers of the primitive, tick length and transition.
 const HEADER: usize = 10;
 /// Bounds of a quantity in units of a DoF. Its products with every gain and rate stay finite.
@@ -72,7 +73,7 @@ impl Controller {
             |expected| Error::Length { name: "snapshot", expected, found: snapshot.len(), per: "number of the state" };
         let Some((head, mut rest)) = snapshot.split_at_checked(HEADER) else { return Err(length(HEADER)) };
         if head[0] != VERSION {
-            return Err(Error::Range { name: "snapshot version", value: head[0], allowed: "must be 2" });
+            return Err(Error::Range { name: "snapshot version", value: head[0], allowed: "must be 3" });
         }
         if head[..HEADER - 2] != header(primitive) {
             return Err(unsuitable("belongs to another model: restore it with the model of its controller"));
@@ -173,6 +174,7 @@ impl Controller {
             amplitude: r_0,
             tau,
             phase: phi,
+            forcing,
         } = conditions;
         visit(s, [-MAX_STYLE_MAGNITUDE, MAX_STYLE_MAGNITUDE])?;
         visit(g, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
@@ -186,6 +188,7 @@ impl Controller {
         visit_number(visit, r_0, [0.0, MAX_MAGNITUDE])?;
         visit_number(visit, tau, [f64::MIN_POSITIVE, f64::MAX])?;
         visit_number(visit, phi, [0.0, turn])?;
+        walk_forcing(visit, forcing, primitive)?;
 
         visit_flag(visit, started)?;
         let mut finished = *status == Status::Finished;
@@ -283,6 +286,26 @@ fn header(primitive: &Primitive) -> [f64; HEADER - 2] {
 /// Returns the error of a snapshot with the given problem.
 fn unsuitable(problem: &'static str) -> Error {
     Error::Argument { name: "snapshot", problem }
+}
+
+/// Visits an additional forcing that may be absent, as the number of its numbers and these.
+fn walk_forcing(
+    visit: &mut Visitor,
+    forcing: &mut Option<Arc<AdditionalForcing>>,
+    primitive: &Primitive,
+) -> Result<()> {
+    let mut numbers = forcing.as_ref().map(|forcing| forcing.to_numbers()).unwrap_or_default();
+    let mut count = numbers.len() as f64;
+    visit_number(visit, &mut count, [0.0, AdditionalForcing::max_numbers(primitive.n_dofs()) as f64])?;
+    numbers.resize(count as usize, 0.0);
+    visit(&mut numbers, [-MAX_MAGNITUDE, MAX_MAGNITUDE])?;
+    *forcing = None;
+    if !numbers.is_empty() {
+        let restored = AdditionalForcing::from_numbers(&numbers)?;
+        restored.check(primitive.canonical(), primitive.n_dofs())?;
+        *forcing = Some(Arc::new(restored));
+    }
+    Ok(())
 }
 
 /// Visits a vector that may be absent, as a flag and `n` numbers.

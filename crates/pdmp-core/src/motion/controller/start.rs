@@ -104,7 +104,7 @@ impl Controller {
             let on_cycle = conditions.style.iter().zip(cycle).fold(State::<F64x4>::default(), |sum, (s, cycle)| {
                 State { e: sum.e + cycle.e * (*r * s), z: sum.z + cycle.z * (*r * s) }
             });
-            *position = self.centre.value()[index] + on_cycle.e;
+            *position = self.centre.value()[index] + on_cycle.e + group.shift;
             group.z = on_cycle.z;
         }
         let phase = conditions.phase;
@@ -130,6 +130,10 @@ impl Controller {
                 group.z = padded(velocity) * tau - group.forcing.value * *r;
             }
         }
+        if conditions.velocity.is_some() {
+            self.add_additional_slope(-1.0);
+        }
+        let Self { conditions, .. } = self;
         if let Some(drift) = &conditions.drift {
             for (group, drift) in self.groups.iter_mut().zip(drift.chunks(WIDTH)) {
                 group.z -= padded(drift);

@@ -207,6 +207,7 @@ impl Controller {
         let table_index = forcing_table.faded_index(clock, fade);
         let style = unpack(self.style.value(), primitive.n_styles());
         let style_rate = (!self.style.is_settled()).then(|| unpack(self.style.rate(), primitive.n_styles()));
+        let additional = self.conditions.forcing.as_deref();
         let (transition, gate_phase_rate) = (self.goal_transition.is_active(), self.perturbation.phase_rate());
         let (n, flush_level, centre) = (self.groups.len(), T::splat(self.flush_level), &mut self.centre);
         let (position, velocity, acceleration) =
@@ -228,6 +229,15 @@ impl Controller {
                 let motion = frame.motion(gate_phase_rate);
                 w = CubicSample { value: w.value + motion.value, slope: w.slope + motion.slope };
             }
+            let mut shift = T::default();
+            if let Some(additional) = additional {
+                let frame = additional.sample::<T>(index, clock);
+                start = start + T::load(&group.shift);
+                shift = frame.value;
+                group.shift = shift.store();
+                let motion = frame.motion(gate_phase_rate);
+                w = CubicSample { value: w.value + motion.value, slope: w.slope + motion.slope };
+            }
             let state = State { e: T::load(&position[index]) - start, z: T::load(&group.z) };
             let mut next = propagator.advance(state, [from, to]);
             let mut y = origin + next.e;
@@ -238,6 +248,9 @@ impl Controller {
                 y = y + response.e;
                 origin = new_goal + displacement * lags[1];
                 next.z = next.z + response.z;
+            }
+            if additional.is_some() {
+                (y, origin) = (y + shift, origin + shift);
             }
             let (y, z) = (flush(y, flush_level), flush(next.z, flush_level));
             (position[index], group.z) = (y.store(), z.store());
@@ -292,6 +305,9 @@ impl Controller {
     pub(super) fn read_frame(&mut self) {
         self.transport_segment = self.primitive.transport.segment_at(self.clock.value());
         self.frame_lag = self.transport_segment.lag(self.clock.value()).value;
+        for index in 0..self.groups.len() {
+            self.groups[index].shift = self.additional_frame(index).value;
+        }
     }
 
     /// Evaluates the forcing after clock or style was set.
@@ -314,6 +330,7 @@ impl Controller {
     pub(super) fn change_phase_rate(&mut self) {
         let change = self.forcing_phase_rate - self.perturbation.phase_rate();
         self.take_up_drift(change);
+        self.add_additional_slope(change);
         if self.has_frame() {
             let TransportSample { slope, .. } = self.primitive.transport.lag(self.clock.value());
             for (index, group) in self.groups.iter_mut().enumerate() {
@@ -341,7 +358,11 @@ impl Controller {
             let motion = frame.motion(self.perturbation.phase_rate());
             let mut w = add_frame_motion(gate.forcing(&forcing), displacement, frame_slopes);
             w = CubicSample { value: w.value + motion.value, slope: w.slope + motion.slope };
-            let e = self.position[index] - (self.centre.value()[index] + displacement * value + frame.value);
+            let additional = self.additional_frame(index);
+            let motion = additional.motion(self.perturbation.phase_rate());
+            w = CubicSample { value: w.value + motion.value, slope: w.slope + motion.slope };
+            let frame = self.centre.value()[index] + displacement * value + frame.value + additional.value;
+            let e = self.position[index] - frame;
             [self.velocity[index], self.acceleration[index]] = gate.motion(attractor, State { e, z }, w);
         }
         if let Some(PerturbationTerms { velocity, acceleration }) = self.perturbation.terms() {

@@ -1,0 +1,252 @@
+//! Scalar constraints of via-points on a movement.
+
+use super::linear_path::LinearPath;
+use super::passage::{Constraint, Constraints, Prior};
+use super::via_points::{At, ViaPoint};
+use crate::dynamics::canonical::{Canonical, turn};
+use crate::dynamics::time_warp::WarpingFunction;
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::model::conditions::ResolvedConditions;
+use crate::model::primitive::Primitive;
+use crate::validate::{check_finite, check_length, check_range};
+
+/// Distance of two places, or of a place from an end, that is rounding.
+const SAME_PLACE: f64 = 1e-9;
+/// Standard deviation of a position, relative to the range, below which the conditions fix it.
+const FIXED: f64 = 1e-9;
+
+/// Movement that points constrain.
+pub(super) struct Request<'a> {
+    pub(super) primitive: &'a Primitive,
+    pub(super) conditions: &'a ResolvedConditions,
+    pub(super) prior: &'a Prior<'a>,
+    /// Ranges (D,), none of them zero.
+    pub(super) scales: &'a [f64],
+    pub(super) time: &'a WarpingFunction,
+    /// Place from which on the movement departs from its conditions.
+    pub(super) from: Option<f64>,
+    /// Values of the parameters θ₀.
+    pub(super) parameters: Vec<f64>,
+}
+
+impl Request<'_> {
+    /// Returns the constraints of points.
+    ///
+    /// # Errors
+    /// As for [`super::through`].
+    pub(super) fn constraints(&self, points: &[ViaPoint]) -> Result<Constraints> {
+        let mut constraints = Constraints::default();
+        for point in points {
+            self.add(point, &mut constraints)?;
+        }
+        Ok(constraints)
+    }
+
+    /// Adds the constraints of a point.
+    fn add(&self, point: &ViaPoint, constraints: &mut Constraints) -> Result<()> {
+        let allowed = "must be a share of the range, finite and not negative";
+        check_range("tolerance", point.tolerance, (0.0..=1e6).contains(&point.tolerance), allowed)?;
+        let [v, rate] = self.place(point.at)?;
+        let n = self.primitive.n_coordinates();
+        let given = point.dofs.clone().unwrap_or_else(|| (0..n).collect());
+        if let Some(&dof) = given.iter().find(|&&dof| dof >= n) {
+            let allowed = "must be below the number of DoFs, or of coordinates with rotations";
+            return Err(Error::Range { name: "dofs", value: dof as f64, allowed });
+        }
+        if given.is_empty() || (point.position.is_none() && point.velocity.is_none()) {
+            let problem = "constrain nothing: give each a position or a velocity of at least one DoF";
+            return Err(Error::Argument { name: "points", problem });
+        }
+        for (name, vector) in [("position", &point.position), ("velocity", &point.velocity)] {
+            if let Some(vector) = vector {
+                check_length(name, vector.len(), given.len(), "DoF of the point")?;
+                check_finite(name, vector)?;
+            }
+        }
+        let same = |place: &f64| (place - v).abs() <= SAME_PLACE;
+        let place = constraints.places.iter().position(same).unwrap_or_else(|| {
+            constraints.places.push(v);
+            constraints.places.len() - 1
+        });
+        let dofs = self.of_dofs(point, &given, v)?;
+        for (dof, position, velocity) in dofs {
+            if let Some(position) = position {
+                self.constrain(constraints, [place, 0, dof], position, point.tolerance)?;
+            }
+            if let Some(velocity) = velocity {
+                self.constrain(constraints, [place, 1, dof], velocity / rate, point.tolerance)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns DoF, position and velocity of each constraint on a DoF.
+    fn of_dofs(&self, point: &ViaPoint, given: &[usize], v: f64) -> Result<Vec<(usize, Option<f64>, Option<f64>)>> {
+        let at = |vector: &Option<Vec<f64>>, i: usize| vector.as_ref().map(|vector| vector[i]);
+        let Some(coordinates) = self.primitive.coordinates() else {
+            return Ok(given
+                .iter()
+                .enumerate()
+                .map(|(i, &d)| (d, at(&point.position, i), at(&point.velocity, i)))
+                .collect());
+        };
+        if point.velocity.is_some() {
+            let problem = "does not apply: a primitive with rotations takes positions of points alone";
+            return Err(Error::Argument { name: "velocity", problem });
+        }
+        // Coordinates that are not given are those of the prior mean.
+        let u = v * self.primitive.canonical().extent();
+        let mean: Vec<f64> = (0..self.scales.len()).map(|dof| self.mean(v, 0, dof)).collect();
+        let mut position = vec![0.0; self.primitive.n_coordinates()];
+        coordinates.to_position(u, &mean, &mut position);
+        for (i, &coordinate) in given.iter().enumerate() {
+            position[coordinate] = at(&point.position, i).unwrap_or(position[coordinate]);
+        }
+        coordinates.check("position", &position)?;
+        let mut dofs = vec![0.0; self.scales.len()];
+        coordinates.to_dofs(u, &position, Some(&mean), &mut dofs);
+        let mut constrained = vec![];
+        for rotation in coordinates.rotations() {
+            let columns = rotation.columns.column..rotation.columns.column + 4;
+            match columns.filter(|column| given.contains(column)).count() {
+                0 => {}
+                4 => constrained.extend(rotation.dof..rotation.dof + 3),
+                _ => {
+                    let problem = "have a part of a quaternion: give all four of its coordinates or none";
+                    return Err(Error::Argument { name: "dofs", problem });
+                }
+            }
+        }
+        constrained
+            .extend(coordinates.plain().iter().filter(|[column, _]| given.contains(column)).map(|[_, dof]| *dof));
+        Ok(constrained.into_iter().map(|dof| (dof, Some(dofs[dof]), None)).collect())
+    }
+
+    /// Adds the constraint that a derivative of a DoF has a value.
+    fn constrain(
+        &self,
+        constraints: &mut Constraints,
+        [place, order, dof]: [usize; 3],
+        value: f64,
+        tolerance: f64,
+    ) -> Result<()> {
+        let v = constraints.places[place];
+        let row = self.row(v, order, dof).0;
+        let residual = value - self.mean(v, order, dof);
+        let scale = self.scales[dof];
+        let repeated = |other: &&Constraint| (other.place, other.order, other.dof) == (place, order, dof);
+        if let Some(other) = constraints.rows.iter().find(repeated)
+            && tolerance == 0.0
+            && other.tolerance == 0.0
+        {
+            if (other.residual - residual).abs() <= SAME_PLACE * scale {
+                return Ok(());
+            }
+            let problem = "differ at one place: leave one out, or give them a tolerance";
+            return Err(Error::Argument { name: "points", problem });
+        }
+        let is_end = v <= SAME_PLACE || v >= 1.0 - SAME_PLACE;
+        if self.prior.canonical.kind() == Kind::Discrete && is_end && (order > 0 || self.is_fixed(&row, scale)) {
+            let problem = "constrain an end of the movement, which the conditions fix: change start, goal, velocity or \
+                           goal_velocity instead";
+            return Err(Error::Argument { name: "points", problem });
+        }
+        constraints.rows.push(Constraint { place, order, dof, row, residual, tolerance: tolerance * scale, scale });
+        Ok(())
+    }
+
+    /// Returns whether the parameters do not change aᵀθ.
+    fn is_fixed(&self, row: &[f64], scale: f64) -> bool {
+        let covariance = &self.prior.covariance;
+        let variance: f64 =
+            (0..row.len()).map(|p| row[p] * (0..row.len()).map(|q| covariance[(p, q)] * row[q]).sum::<f64>()).sum();
+        self.from.is_some() || variance <= (FIXED * scale).powi(2)
+    }
+
+    /// Adds the constraints that the displacement and two derivatives vanish where it begins and ends.
+    pub(super) fn add_ends(&self, constraints: &mut Constraints) {
+        let discrete = matches!(self.prior.canonical, Canonical::Discrete { .. });
+        let mut ends = Vec::new();
+        if discrete || self.from.is_some() {
+            ends.push(self.from.unwrap_or(0.0));
+        }
+        if discrete {
+            ends.push(1.0);
+        }
+        for v in ends {
+            let place = constraints.places.len();
+            constraints.places.push(v);
+            for dof in 0..self.scales.len() {
+                for order in 0..3 {
+                    let mut row = vec![0.0; self.parameters.len()];
+                    if self.from.is_some() {
+                        row = self.row(v, order, dof).0;
+                    }
+                    let scale = self.scales[dof];
+                    constraints.rows.push(Constraint { place, order, dof, row, residual: 0.0, tolerance: 0.0, scale });
+                }
+            }
+        }
+    }
+
+    /// Returns a and c of a derivative of a DoF.
+    fn row(&self, v: f64, order: usize, dof: usize) -> (Vec<f64>, f64) {
+        let mut row = vec![0.0; self.parameters.len()];
+        let constant = self.prior.path.row(&LinearPath::place(v, order), order, dof, &mut row);
+        (row, constant)
+    }
+
+    /// Returns a derivative of a DoF under the conditions.
+    fn mean(&self, v: f64, order: usize, dof: usize) -> f64 {
+        let (row, constant) = self.row(v, order, dof);
+        let extent = self.prior.canonical.extent();
+        let displaced = self
+            .conditions
+            .forcing
+            .as_ref()
+            .map_or(0.0, |forcing| forcing.displacement(v * extent)[order][dof] * extent.powi(order as i32));
+        constant + displaced + row.iter().zip(&self.parameters).map(|(a, b)| a * b).sum::<f64>()
+    }
+
+    /// Returns the place v of a point and dv/dt there.
+    fn place(&self, at: At) -> Result<[f64; 2]> {
+        let kind = self.prior.canonical.kind();
+        let v = match at {
+            At::Time(time) => {
+                let last = if kind == Kind::Discrete { self.time.duration() * (1.0 + SAME_PLACE) } else { f64::MAX };
+                let allowed =
+                    "seconds must lie between the start and the end of the movement; see tau and segment_durations";
+                check_range("time", time, (0.0..=last).contains(&time), allowed)?;
+                self.time.phase(time)[0] + self.conditions.phase / self.prior.canonical.extent()
+            }
+            At::Phase(phase) => share_at(self.prior.canonical, "phase", phase)?,
+        };
+        let v = if kind == Kind::Discrete { v.min(1.0) } else { v.rem_euclid(1.0) };
+        if let (Kind::Discrete, Some(from)) = (kind, self.from)
+            && v <= from + SAME_PLACE
+        {
+            return Err(Error::Argument { name: "points", problem: "must lie after from_phase" });
+        }
+        Ok([v, self.time.slope(v).recip()])
+    }
+}
+
+/// Returns the share of the movement or period at a phase.
+///
+/// # Errors
+/// A phase outside of the movement.
+pub(super) fn share_at(canonical: Canonical, name: &'static str, phase: f64) -> Result<f64> {
+    let allowed = "must lie between x at the end of the movement and 1, or be a finite angle in rad of a rhythmic one";
+    let valid = match canonical {
+        Canonical::Discrete { .. } => phase <= 1.0 && phase > 0.0,
+        Canonical::Rhythmic { .. } => phase.is_finite(),
+    };
+    check_range(name, phase, valid, allowed)?;
+    let share = match canonical {
+        Canonical::Discrete { u_end, .. } => canonical.clock_at(phase) / u_end,
+        Canonical::Rhythmic { .. } => turn(phase) / canonical.extent(),
+    };
+    check_range(name, phase, share <= 1.0 + SAME_PLACE, allowed)?;
+    Ok(share.min(1.0))
+}
