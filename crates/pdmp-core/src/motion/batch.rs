@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ndarray::{Array3, ArrayViewMut3, Axis, aview1, s};
 
 use crate::error::{Error, Result};
+use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
@@ -18,11 +19,11 @@ use crate::numerics::threads::Threads;
 use crate::validate::{check_range, row_major, zeros};
 
 /// Number of elements of each output that one thread writes per block.
-const BLOCK: usize = 1 << 17;
+pub(super) const BLOCK: usize = 1 << 17;
 /// Minimum number of movements per block, so that a tile of the responses is read from cache several times.
-const MIN_MOVEMENTS_PER_BLOCK: usize = 8;
+pub(super) const MIN_MOVEMENTS_PER_BLOCK: usize = 8;
 /// Number of blocks per thread between two calls of `progress`.
-const PROGRESS_INTERVAL: usize = 16;
+pub(super) const PROGRESS_INTERVAL: usize = 16;
 
 /// Checked movements of a batch, ready to be computed as a whole or in parts, with bitwise equal results.
 ///
@@ -48,17 +49,21 @@ const PROGRESS_INTERVAL: usize = 16;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Batch {
-    responses: Arc<Responses>,
+    pub(super) responses: Arc<Responses>,
     n_movements: usize,
-    styles: PerMovement,
+    pub(super) kind: Kind,
+    pub(super) styles: PerMovement,
     /// Goals of discrete, anchors of rhythmic movements.
     centres: PerMovement,
-    starts: Option<PerMovement>,
-    velocities: Option<PerMovement>,
-    goal_velocities: Option<PerMovement>,
-    amplitude: f64,
-    /// Primitive with rotations, sampling interval in s, and rate 1/τ.
-    pose: Option<(Arc<Primitive>, f64, f64)>,
+    pub(super) starts: Option<PerMovement>,
+    pub(super) velocities: Option<PerMovement>,
+    pub(super) goal_velocities: Option<PerMovement>,
+    pub(super) amplitude: f64,
+    pub(super) tau: f64,
+    /// Sampling interval, in s.
+    pub(super) dt: f64,
+    /// Primitive with rotations.
+    pub(super) pose: Option<Arc<Primitive>>,
 }
 
 /// Checks the conditions of a batch and computes the unit responses, unless the primitive has them in its cache.
@@ -84,13 +89,16 @@ pub fn batch(
     Ok(Batch {
         responses: responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?,
         n_movements,
+        kind: primitive.kind(),
         styles: style.unwrap_or(PerMovement::All(nominal.style)),
         centres: goal.or(anchor).unwrap_or(PerMovement::All(nominal.centre)),
         starts: start.or(nominal.start.map(PerMovement::All)),
         velocities: velocity,
         goal_velocities: goal_velocity,
         amplitude: nominal.amplitude,
-        pose: outside.coordinates().is_some().then(|| (Arc::clone(outside), grid.dt, 1.0 / nominal.tau)),
+        tau: nominal.tau,
+        dt: grid.dt,
+        pose: outside.coordinates().is_some().then(|| Arc::clone(outside)),
     })
 }
 
@@ -118,7 +126,7 @@ impl Batch {
     /// ```
     pub fn n_columns(&self, derivative: Derivative) -> usize {
         match &self.pose {
-            Some((primitive, ..)) if derivative == Derivative::Position => primitive.n_coordinates(),
+            Some(primitive) if derivative == Derivative::Position => primitive.n_coordinates(),
             _ => self.shape().2,
         }
     }
@@ -242,14 +250,9 @@ impl Batch {
     }
 
     /// Writes the movements of consecutive combinations in coordinates.
-    fn write_poses(
-        &self,
-        (primitive, dt, rate): &(Arc<Primitive>, f64, f64),
-        combinations: &[Combination],
-        mut outputs: Vec<ArrayViewMut3<f64>>,
-    ) {
+    fn write_poses(&self, primitive: &Primitive, combinations: &[Combination], mut outputs: Vec<ArrayViewMut3<f64>>) {
         let Some(coordinates) = primitive.coordinates() else { return };
-        let (_, n_samples, n_dofs) = self.shape();
+        let ((_, n_samples, n_dofs), rate) = (self.shape(), 1.0 / self.tau);
         let mut dofs = [(); 3].map(|()| Array3::zeros((1, n_samples, n_dofs)));
         let mut moved = [vec![0.0; coordinates.n_coordinates()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
         for (b, combination) in combinations.iter().enumerate() {
@@ -261,7 +264,7 @@ impl Batch {
             for k in 0..n_samples {
                 let rows = dofs.each_ref().map(|dofs| &row_major(dofs)[k * n_dofs..][..n_dofs]);
                 let [position, velocity, acceleration] = &mut moved;
-                coordinates.motion(k as f64 * dt * rate, [*rate, 0.0], rows, position, velocity, acceleration);
+                coordinates.motion(k as f64 * self.dt * rate, [rate, 0.0], rows, position, velocity, acceleration);
                 for (output, moved) in outputs.iter_mut().zip(&moved) {
                     output.slice_mut(s![b, k, ..]).assign(&aview1(moved));
                 }
@@ -270,7 +273,7 @@ impl Batch {
     }
 
     /// Returns the coefficients of movement `b`.
-    fn combination(&self, b: usize) -> Combination {
+    pub(super) fn combination(&self, b: usize) -> Combination {
         let style: Vec<f64> = self.styles.row(b).iter().map(|s| self.amplitude * s).collect();
         let centre = self.centres.row(b).to_vec();
         // Difference of a condition from its value at the start of the sum of the styles.

@@ -20,6 +20,7 @@ pub(crate) mod time_law;
 pub(crate) mod trajectory;
 mod two_arms;
 pub(crate) mod unit_responses;
+mod vector_jacobian;
 pub(crate) mod viability;
 
 pub use batch::{Batch, BatchChunks, batch};
