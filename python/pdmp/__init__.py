@@ -44,7 +44,7 @@ from pdmp._native import (
 from pdmp.realtime import PacedLoop, Tick
 
 if _TYPE_CHECKING:
-    from pdmp import datasets, evaluation, robots
+    from pdmp import autodiff, datasets, evaluation, robots
     from pdmp.evaluation import evaluate
 else:
 
@@ -52,7 +52,7 @@ else:
         """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
             return _import_module("pdmp.evaluation").evaluate
-        if name in ("datasets", "evaluation", "robots"):
+        if name in ("autodiff", "datasets", "evaluation", "robots"):
             return _import_module(f"pdmp.{name}")
         raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
 
@@ -85,6 +85,7 @@ __all__ = [
     "TimeWarp",
     "Trajectory",
     "__version__",
+    "autodiff",
     "blend",
     "datasets",
     "evaluate",

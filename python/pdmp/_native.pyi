@@ -28,6 +28,9 @@ _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
 _Kernel: TypeAlias = Literal["matern32", "matern52"]
 _Order: TypeAlias = Literal["wxyz", "xyzw"]
+_Variable: TypeAlias = Literal[
+    "style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude", "tau"
+]
 
 __all__ = [
     "Conditions",
@@ -941,6 +944,68 @@ class Model:
         >>> positions.shape
         (5, 13, 2)
         """
+    def rollouts_vjp(
+        self,
+        wrt: _Variable | Sequence[_Variable],
+        cotangents: ArrayLike | tuple[ArrayLike, ...],  # each (B, T, D)
+        conditions: Conditions | Sequence[Conditions] | None = None,
+        *,
+        dt: float = 0.01,
+        duration: float | None = None,
+        context: _Context | _Contexts | None = None,
+        threads: int | None = None,
+        **changes: Unpack[_Changes],  # vectors (n,) or (B, n)
+    ) -> tuple[_Array, ...]:  # each (B, n) or (B,)
+        """Computes the gradients of a function of many movements with respect to their conditions.
+
+        For a function L of the results of `rollouts`, with the cotangents v = ∂L/∂y, returns the vector-Jacobian products
+        ∂L/∂x = Σ_t v(t)·∂y(t)/∂x of the conditions x. A movement is linear in all conditions but tau, so that the products
+        are exact; no Jacobian is formed, and a call takes about as long as `rollouts`. With respect to tau, they hold at
+        fixed times. `pdmp.autodiff` wraps both calls for torch and jax.
+
+        Parameters
+        ----------
+        wrt : str or sequence of str
+            Conditions x: "style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude" or "tau".
+        cotangents : array_like, (B, T, D), or tuple of array_like
+            ∂L/∂y of the positions, or of positions, velocities and accelerations as far as L depends on them.
+        conditions : Conditions, or B Conditions, optional
+            As in `rollouts`.
+        context : array_like or list, (Q,) or (B, Q), optional
+            As in `rollouts`.
+        dt, duration : float, optional
+            As in `rollouts`.
+        threads : int, optional
+            As in `rollouts`.
+        **changes
+            As in `rollouts`.
+
+        Returns
+        -------
+        tuple of ndarray
+            ∂L/∂x in the order of `wrt`: (B, J) for the style, (B,) for amplitude and tau, else (B, D). Row b is the
+            gradient by the condition of movement b; the gradient by a condition that all share is the sum of the rows.
+
+        Raises
+        ------
+        ValueError
+            An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind
+            of primitive; a velocity or start of which there is none to differentiate by; tau with accelerations; or a
+            model with rotations.
+        TypeError
+            As in `rollouts`.
+
+        Examples
+        --------
+        >>> goals = model.goals + 0.1
+        >>> (positions,) = model.rollouts(goal=goals, style=model.styles, dt=0.1, derivatives=0)
+        >>> loss, cotangents = 0.5 * (positions**2).sum(), positions
+        >>> by_style, by_goal = model.rollouts_vjp(
+        ...     ["style", "goal"], cotangents, goal=goals, style=model.styles, dt=0.1
+        ... )
+        >>> by_style.shape, by_goal.shape
+        ((5, 2), (5, 2))
+        """
     def rollout_chunks(
         self,
         conditions: Conditions | Sequence[Conditions] | None = None,
@@ -1097,7 +1162,7 @@ class Model:
         """
     def jacobian(
         self,
-        wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
+        wrt: _Variable,
         conditions: Conditions | None = None,
         *,
         derivative: int = 0,  # at most 2
@@ -1105,16 +1170,17 @@ class Model:
         duration: float | None = None,
         context: _Context | None = None,
         **changes: Unpack[_Changes],
-    ) -> _Array:  # (T, D, J) or (T, D, D)
+    ) -> _Array:  # (T, D, J), (T, D, 1) or (T, D, D)
         """Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
 
-        A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
-        Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
-        `velocity` and `goal_velocity`.
+        A movement is linear in all conditions but tau: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same Jacobian for
+        all values of v. It depends on tau, and on the presence of `start`, `velocity` and `goal_velocity`; that by the
+        style also on the amplitude, and that by the amplitude on the style. With respect to tau it is the derivative at
+        fixed times, with velocities among the conditions constant. `rollouts_vjp` gives gradients without a Jacobian.
 
         Parameters
         ----------
-        wrt : {"style", "goal", "anchor", "start", "goal_velocity"}
+        wrt : {"style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude", "tau"}
             Condition v.
         conditions : Conditions, optional
             Conditions at the start.
@@ -1131,13 +1197,15 @@ class Model:
 
         Returns
         -------
-        ndarray, (T, D, J) or (T, D, D)
-            ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style.
+        ndarray, (T, D, J), (T, D, 1) or (T, D, D)
+            ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style, (T, D, 1) for
+            amplitude and tau.
 
         Raises
         ------
         ValueError
-            Conditions that `rollout` rejects, a condition of the other kind of primitive, or several segment durations.
+            Conditions that `rollout` rejects, a condition of the other kind of primitive, several segment durations, or
+            tau with accelerations.
 
         Examples
         --------

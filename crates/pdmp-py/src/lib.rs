@@ -17,6 +17,7 @@ mod explorer;
 mod factorization;
 mod feasibility;
 mod fit;
+mod gradients;
 mod inspection;
 mod instance;
 mod labelled;
