@@ -36,6 +36,7 @@ __all__ = [
     "Conditions",
     "ContextMap",
     "Controller",
+    "Controllers",
     "Demonstration",
     "Factors",
     "FitError",
@@ -1602,6 +1603,18 @@ class Model:
         ----------
         Pham, Pham, IEEE Transactions on Robotics 34(3), 2018, doi:10.1109/TRO.2018.2819195.
         """
+    def controllers(
+        self,
+        n_movements: int,
+        dt: float = 0.001,
+        conditions: Conditions | Sequence[Conditions] | None = None,
+        *,
+        limits: Limits | None = None,
+        transition: float | None = None,
+        context: _Context | _Contexts | None = None,
+        out: Sequence[_Array] | None = None,  # three arrays (B, D)
+        **changes: Unpack[_Changes],  # one value, or rows (B, n)
+    ) -> Controllers: ...
     def controller(
         self,
         dt: float = 0.001,
@@ -2517,6 +2530,49 @@ class Controller:
         """Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each."""
     @compliance.setter
     def compliance(self, compliance: tuple[float, float], /) -> None: ...
+
+@final
+class Controllers:
+    def step(
+        self,
+        *,
+        style: ArrayLike | None = None,  # (B, J) or (J,)
+        goal: ArrayLike | None = None,  # (B, D) or (D,)
+        goal_velocity: ArrayLike | None = None,
+        anchor: ArrayLike | None = None,
+        tau: ArrayLike | None = None,  # (B,) or a number
+        amplitude: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
+        measured: ArrayLike | None = None,  # (B, D) or (D,)
+        phase: ArrayLike | None = None,  # (B,) or a number
+        mask: ArrayLike | None = None,  # (B,) of bool
+    ) -> NDArray[np.bool_]: ...  # (B,)
+    def reset(
+        self,
+        movements: ArrayLike | None = None,  # (N,) of indices, or (B,) of bool
+        conditions: Conditions | Sequence[Conditions] | None = None,
+        *,
+        context: _Context | _Contexts | None = None,
+        **changes: Unpack[_Changes],  # one value, or rows (N, n)
+    ) -> None: ...
+    def release(self, movements: ArrayLike | None = None) -> None: ...
+    @property
+    def position(self) -> _Array: ...  # (B, D) or (B, nq), written by each tick
+    @property
+    def velocity(self) -> _Array: ...  # (B, D), written by each tick
+    @property
+    def acceleration(self) -> _Array: ...  # (B, D), written by each tick
+    @property
+    def working(self) -> NDArray[np.bool_]: ...  # (B,), written by each tick
+    @property
+    def time(self) -> _Array: ...  # (B,)
+    @property
+    def phase(self) -> _Array: ...  # (B,)
+    @property
+    def dt(self) -> float: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, movement: int, /) -> Controller: ...
+    def __setitem__(self, movement: int, controller: Controller, /) -> None: ...
 
 @final
 class GP:
