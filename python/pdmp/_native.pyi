@@ -1614,7 +1614,49 @@ class Model:
         context: _Context | _Contexts | None = None,
         out: Sequence[_Array] | None = None,  # three arrays (B, D)
         **changes: Unpack[_Changes],  # one value, or rows (B, n)
-    ) -> Controllers: ...
+    ) -> Controllers:
+        """Starts many movements that are computed together, tick by tick.
+
+        Parameters
+        ----------
+        n_movements : int
+            Number B of movements.
+        dt : float
+            Length of a tick in s.
+        conditions : Conditions, or B Conditions, optional
+            Conditions of all movements at the start, or of each.
+        limits : Limits, optional
+            Limits of every movement, see `Controller.limits`.
+        transition : float, optional
+            As in `controller`.
+        context : array_like or list, (Q,) or (B, Q), optional
+            Context of all movements, or of each, whose prediction supplies absent conditions.
+        out : tuple of ndarray, (B, D), optional
+            Writable float64 arrays, contiguous by rows, for positions, velocities and accelerations.
+        **changes
+            Single conditions by name, as in `rollout`; each may have a leading axis, with one row for each movement.
+
+        Returns
+        -------
+        Controllers
+
+        Raises
+        ------
+        ValueError
+            An argument that `controller` rejects, no movement, or rows or `out` that do not fit.
+        TypeError
+            As in `controller`.
+
+        Examples
+        --------
+        >>> controllers = model.controllers(3, dt=0.01, goal=[[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]])
+        >>> while controllers.step().any():
+        ...     pass
+        >>> controllers.position.round(1)
+        array([[1. , 0.1],
+               [1.1, 0. ],
+               [0.9, 0.2]])
+        """
     def controller(
         self,
         dt: float = 0.001,
@@ -2533,6 +2575,12 @@ class Controller:
 
 @final
 class Controllers:
+    """Running movements of one model, returned by `Model.controllers`.
+
+    `step` advances B movements by one tick and writes `position`, `velocity` and `acceleration`, which are arrays of numpy
+    that remain the same. Each movement is that of a `Controller` of its own, to the bit: `controllers[b]` is a copy of it,
+    and `controllers[b] = controller` puts one in its place.
+    """
     def step(
         self,
         *,
@@ -2546,7 +2594,52 @@ class Controllers:
         measured: ArrayLike | None = None,  # (B, D) or (D,)
         phase: ArrayLike | None = None,  # (B,) or a number
         mask: ArrayLike | None = None,  # (B,) of bool
-    ) -> NDArray[np.bool_]: ...  # (B,)
+    ) -> NDArray[np.bool_]:  # (B,)
+        """Advances movements by one tick.
+
+        Commands are those of a `Controller`: an absent one leaves its quantity unchanged, a repeated one has no effect. Each
+        has one row for each movement, or is one vector or number for all. Movements that `mask` leaves out neither move nor
+        take commands, and their rows of the outputs keep their values.
+
+        Parameters
+        ----------
+        style : array_like, (B, J) or (J,), optional
+            New styles.
+        goal, anchor : array_like, (B, D) or (D,), optional
+            New goals of discrete, anchors of rhythmic movements.
+        goal_velocity : array_like, (B, D) or (D,), optional
+            New final velocities of discrete movements, per s.
+        tau : array_like, (B,), or float, optional
+            New time constants in s.
+        amplitude : array_like, (B,), or float, optional
+            New amplitudes of rhythmic movements.
+        speed : array_like, (B,), or float, optional
+            New speeds along the path, see `Controller.speed`.
+        measured : array_like, (B, D), optional
+            Measured positions, see `Controller.step`.
+        phase : array_like, (B,), optional
+            Measured phases of rhythmic movements in rad, see `Controller.step`.
+        mask : array_like of bool, (B,), optional
+            True for the movements of this tick; by default all.
+
+        Returns
+        -------
+        ndarray of bool, (B,)
+            `working`: False for movements that have settled on their goals.
+
+        Raises
+        ------
+        ValueError
+            A shape is wrong, a number is not finite, or `Controller` rejects a command. No movement is changed then.
+
+        Examples
+        --------
+        >>> controllers = model.controllers(4, dt=0.01)
+        >>> _ = controllers.step(goal=model.goals[:4], tau=[0.8, 1.0, 1.2, 1.4])
+        >>> _ = controllers.step(mask=[True, True, False, True])
+        >>> controllers.time.round(2)
+        array([0.02, 0.02, 0.01, 0.02])
+        """
     def reset(
         self,
         movements: ArrayLike | None = None,  # (N,) of indices, or (B,) of bool
@@ -2554,22 +2647,63 @@ class Controllers:
         *,
         context: _Context | _Contexts | None = None,
         **changes: Unpack[_Changes],  # one value, or rows (N, n)
-    ) -> None: ...
-    def release(self, movements: ArrayLike | None = None) -> None: ...
+    ) -> None:
+        """Restarts movements.
+
+        Parameters
+        ----------
+        movements : array_like of int or bool, optional
+            Indices of the N movements to restart, or a mask (B,); by default all.
+        conditions : Conditions, or N Conditions, optional
+            Conditions of these movements at the start, or of each, as in `Controller.reset`.
+        context : array_like or list, (Q,) or (N, Q), optional
+            Context of these movements, or of each, whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name; each may have a leading axis, with one row for each of these movements.
+
+        Raises
+        ------
+        ValueError
+            A movement that does not exist, or conditions that `Model.controllers` rejects. No movement is changed then.
+
+        Examples
+        --------
+        >>> controllers = model.controllers(4, dt=0.01)
+        >>> for _ in range(1000):
+        ...     working = controllers.step(mask=controllers.working)
+        >>> controllers.reset(~working, goal=[1.1, 0.0])
+        >>> bool(controllers.working.all())
+        True
+        """
+    def release(self, movements: ArrayLike | None = None) -> None:
+        """Discards measured positions.
+
+        Parameters
+        ----------
+        movements : array_like of int or bool, optional
+            Indices of movements, or a mask (B,); by default all.
+        """
     @property
-    def position(self) -> _Array: ...  # (B, D) or (B, nq), written by each tick
+    def position(self) -> _Array:  # (B, D) or (B, nq), written by each tick
+        """Positions y (B, D), or (B, nq) in coordinates; the array that every tick writes."""
     @property
-    def velocity(self) -> _Array: ...  # (B, D), written by each tick
+    def velocity(self) -> _Array:  # (B, D), written by each tick
+        """Velocities (B, D) per s; the array that every tick writes."""
     @property
-    def acceleration(self) -> _Array: ...  # (B, D), written by each tick
+    def acceleration(self) -> _Array:  # (B, D), written by each tick
+        """Accelerations (B, D) per s²; the array that every tick writes."""
     @property
-    def working(self) -> NDArray[np.bool_]: ...  # (B,), written by each tick
+    def working(self) -> NDArray[np.bool_]:  # (B,), written by each tick
+        """False for movements that have settled on their goals (B,); the array that every tick writes."""
     @property
-    def time(self) -> _Array: ...  # (B,)
+    def time(self) -> _Array:  # (B,)
+        """Times (B,) since the start in s."""
     @property
-    def phase(self) -> _Array: ...  # (B,)
+    def phase(self) -> _Array:  # (B,)
+        """Phases (B,): x in (0, 1] of discrete movements, φ in [0, 2π) rad of rhythmic ones."""
     @property
-    def dt(self) -> float: ...
+    def dt(self) -> float:
+        """Length of a tick in s."""
     def __len__(self) -> int: ...
     def __getitem__(self, movement: int, /) -> Controller: ...
     def __setitem__(self, movement: int, controller: Controller, /) -> None: ...

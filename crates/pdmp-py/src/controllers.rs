@@ -113,12 +113,8 @@ impl Controllers {
         {
             buffers.read_numbers(slot, name, value, n)?;
         }
-        let speeds = speed.map(|value| number_each("speed", value, n)).transpose()?;
-        let has_commands =
-            [style, goal, goal_velocity, anchor, measured, tau, amplitude, phase].iter().any(Option::is_some);
-        if let Some(speeds) = speeds {
-            self.set_speeds(&speeds, mask.as_deref())?;
-        }
+        let commands = [style, goal, goal_velocity, anchor, measured, tau, amplitude, phase, speed];
+        let has_commands = commands.iter().any(Option::is_some);
         let [mut position, mut velocity, mut acceleration] =
             [&self.position, &self.velocity, &self.acceleration].map(|array| array.bind(py).try_readwrite());
         let mut slices = [&mut position, &mut velocity, &mut acceleration]
@@ -282,7 +278,7 @@ impl Controllers {
         outputs: [Matrix<'_>; 3],
     ) -> PyResult<Self> {
         let (n, [position, velocity, acceleration]) = (inner.len(), outputs.map(Bound::unbind));
-        let working = PyArray1::from_elem(py, n, true).unbind();
+        let working = PyArray1::from_vec(py, vec![true; n]).unbind();
         let mut controllers =
             Self { inner, model, position, velocity, acceleration, working, buffers: Buffers::default() };
         controllers.publish(py, &(0..n).collect::<Vec<_>>())?;
