@@ -196,6 +196,11 @@ impl Controllers {
     /// ----------
     /// movements : array_like of int or bool, optional
     ///     Indices of movements, or a mask (B,); by default all.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A movement that does not exist.
     #[pyo3(signature = (movements=None))]
     fn release(&mut self, py: Python<'_>, movements: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let movements = self::movements(movements, self.inner.len())?;

@@ -1,7 +1,7 @@
 //! Vector-Jacobian products of batches.
 
-use ndarray::{Array3, Axis, Ix3};
-use numpy::IntoPyArray;
+use ndarray::{Array3, ArrayView3, Axis, Ix3};
+use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pdmp_core::motion::{TimeGrid, WithRespectTo, batch};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -102,16 +102,16 @@ impl Model {
         let is_name = wrt.is_instance_of::<PyString>();
         let variables = if is_name { vec![variable("wrt", wrt)?] } else { items("wrt", wrt, variable)? };
         let cotangents = match cotangents {
-            several if several.is_instance_of::<PyTuple>() => items("cotangents", several, cube)?,
-            one => vec![cube("cotangents", one)?],
+            several if several.is_instance_of::<PyTuple>() => items("cotangents", several, Cotangents::of)?,
+            one => vec![Cotangents::of("cotangents", one)?],
         };
         let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
         let (threads, conditions) =
             (self::threads(threads)?, batch_conditions_of(py, &self.0, conditions, context, changes)?);
+        let views: Vec<_> = cotangents.iter().map(Cotangents::view).collect();
         let gradients = interruptible(py, |progress| {
             let batch = batch(self.0.primitive(), conditions, grid, &mut *progress)?;
-            let cotangents: Vec<_> = cotangents.iter().map(|array| array.view()).collect();
-            batch.vector_jacobian(0..batch.shape().0, &variables, &cotangents, threads, progress)
+            batch.vector_jacobian(0..batch.shape().0, &variables, &views, threads, progress)
         })?;
         let arrays = gradients.into_iter().zip(variables).map(|(rows, variable)| match variable {
             WithRespectTo::Amplitude | WithRespectTo::Tau => {
@@ -123,12 +123,31 @@ impl Model {
     }
 }
 
-/// Converts to an array (B, T, D).
-fn cube(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Array3<f64>> {
-    let array = array(name, value)?;
-    let shape = array.shape().to_vec();
-    let expected = "expected (movements, samples, degrees of freedom)";
-    array
-        .into_dimensionality::<Ix3>()
-        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, {expected}")))
+/// Cotangents (B, T, D): those of numpy, read without a copy if they are doubles, or converted ones.
+enum Cotangents<'py> {
+    Borrowed(PyReadonlyArray3<'py, f64>),
+    Owned(Array3<f64>),
+}
+
+impl<'py> Cotangents<'py> {
+    fn of(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = value.cast_exact::<PyArray3<f64>>()
+            && array.is_aligned()
+            && let Ok(borrowed) = array.try_readonly()
+        {
+            return Ok(Self::Borrowed(borrowed));
+        }
+        let array = array(name, value)?;
+        let shape = array.shape().to_vec();
+        let expected = "expected (movements, samples, degrees of freedom)";
+        let wrong = |_| PyValueError::new_err(format!("{name} has shape {shape:?}, {expected}"));
+        array.into_dimensionality::<Ix3>().map(Self::Owned).map_err(wrong)
+    }
+
+    fn view(&self) -> ArrayView3<'_, f64> {
+        match self {
+            Self::Borrowed(array) => array.as_array(),
+            Self::Owned(array) => array.view(),
+        }
+    }
 }

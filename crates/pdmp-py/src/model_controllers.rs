@@ -51,13 +51,12 @@ impl Model {
     ///
     /// Examples
     /// --------
-    /// >>> controllers = model.controllers(3, dt=0.01, goal=[[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]])
+    /// >>> goals = [[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]]
+    /// >>> controllers = model.controllers(3, dt=0.01, goal=goals)
     /// >>> while controllers.step().any():
     /// ...     pass
-    /// >>> controllers.position.round(1)
-    /// array([[1. , 0.1],
-    ///        [1.1, 0. ],
-    ///        [0.9, 0.2]])
+    /// >>> np.allclose(controllers.position, goals, atol=0.01)
+    /// True
     #[pyo3(
         signature = (
             n_movements, dt=Scalar::Number(0.001), conditions=None, *, limits=None, transition=None, context=None, out=None,

@@ -16,7 +16,7 @@ use crate::validate::{check_length, check_range};
 ///
 /// Each moves as a [`Controller`] of its own would, to the bit. Between changes of their commands, movements are kept in
 /// compact memory and advanced in one loop; a movement in transition, within limits, perturbed, past its end or with
-/// rotations takes the tick of its controller. Nothing allocates after [`Controllers::new`] but [`Controllers::reset`].
+/// rotations takes the tick of its controller. After [`Controllers::new`], ticks and commands do not allocate.
 ///
 /// ```
 /// use ndarray::array;
@@ -125,7 +125,8 @@ impl Controllers {
     /// ```
     ///
     /// # Errors
-    /// As for [`Controllers::step`] and [`Controller::update`]. No movement moves then, and no command but speeds takes effect.
+    /// As for [`Controllers::step`] and [`Controller::update`]. No movement moves then, and of the commands only speeds take
+    /// effect.
     pub fn update(&mut self, commands: &Commands, mask: Option<&[bool]>, motions: &mut Motions) -> Result<()> {
         self.check(mask, motions)?;
         commands.check(self.len())?;
@@ -149,7 +150,7 @@ impl Controllers {
         self.advance(mask, motions, |controller, b| controller.step_with(&commands.of(b)))
     }
 
-    /// Restarts some movements, each under one of as many conditions.
+    /// Restarts some movements, each under conditions of its own.
     ///
     /// ```
     /// # use pdmp_core::motion::Controllers;

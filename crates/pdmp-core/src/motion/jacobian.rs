@@ -68,9 +68,9 @@ impl WithRespectTo {
 /// ```
 ///
 /// with the responses R to the unit styles, E to a unit start, V to a unit start velocity and G to a unit final velocity. If
-/// a final velocity is given, all responses keep it. The terms with E and V apply
-/// only if a start or a start velocity is given. τ scales time, and velocities given per second keep their values. `derivative` selects y, ẏ or ÿ. `progress` is called periodically with the
-/// completed fraction; an error it returns cancels the call.
+/// a final velocity is given, all responses keep it. The terms with E and V apply only if a start or a start velocity is
+/// given. τ scales time, and velocities given per second keep their values. `derivative` selects y, ẏ or ÿ. `progress` is
+/// called periodically with the completed fraction; an error it returns cancels the call.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
