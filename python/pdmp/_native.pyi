@@ -1649,13 +1649,12 @@ class Model:
 
         Examples
         --------
-        >>> controllers = model.controllers(3, dt=0.01, goal=[[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]])
+        >>> goals = [[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]]
+        >>> controllers = model.controllers(3, dt=0.01, goal=goals)
         >>> while controllers.step().any():
         ...     pass
-        >>> controllers.position.round(1)
-        array([[1. , 0.1],
-               [1.1, 0. ],
-               [0.9, 0.2]])
+        >>> np.allclose(controllers.position, goals, atol=0.01)
+        True
         """
     def controller(
         self,
@@ -2682,6 +2681,11 @@ class Controllers:
         ----------
         movements : array_like of int or bool, optional
             Indices of movements, or a mask (B,); by default all.
+
+        Raises
+        ------
+        ValueError
+            A movement that does not exist.
         """
     @property
     def position(self) -> _Array:  # (B, D) or (B, nq), written by each tick
