@@ -33,7 +33,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install packages header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-controllers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install packages header stubs \
 	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -67,6 +67,9 @@ bench: | needs  ## Times, latencies and instructions of the core
 
 bench-peers: .venv/with-peers  ## The same work done by pdmp and by its peers, one thread each
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m peers
+
+bench-controllers: .venv/with-demo  ## A tick of 4096 movements in Python: together, one by one, and by plain numpy and torch
+	OMP_NUM_THREADS=1 $(BIN)/python benches/controllers.py
 
 bench-scaling: .venv/with-peers  ## Draws how the time to learn grows with the data, into docs/scaling.png
 	OMP_NUM_THREADS=1 $(BIN)/python benches/scaling.py

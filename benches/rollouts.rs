@@ -35,6 +35,15 @@ fn rollouts(criterion: &mut Criterion) {
         let conditions = BatchConditions { style: Some(PerMovement::Each(styles)), ..BatchConditions::default() };
         let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(())).expect("a batch");
         let mut outputs = [(); 2].map(|()| Array3::zeros(batch.shape()));
+        let cotangents = [(); 2].map(|()| Array3::from_elem(batch.shape(), 0.5));
+        let cotangents = cotangents.each_ref().map(|array| array.view());
+        let variables = [WithRespectTo::Style, WithRespectTo::Goal, WithRespectTo::Start, WithRespectTo::Tau];
+        for (name, variables) in [("", &variables[..3]), (" and tau", &variables[..])] {
+            let name = format!("1000 gradients of positions and velocities by style, goal, start{name}, J={n_styles}");
+            group.bench_function(name, |bench| {
+                bench.iter(|| batch.vector_jacobian(0..1000, variables, &cotangents, Threads::ONE, &mut |_| Ok(())));
+            });
+        }
         for n_threads in [1, 2] {
             let threads = Threads::new(n_threads).expect("some");
             group.bench_function(

@@ -192,7 +192,7 @@ TEXTS: dict[str, tuple[Callable[..., Any], str]] = {
     "kernel": (lambda _, **text: pdmp.GP(**text), '"matern52" or "matern32"'),
     "wrt": (
         lambda model, **text: model.jacobian(**text),
-        '"style", "goal", "anchor", "start" or "goal_velocity"',
+        '"style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude" or "tau"',
     ),
     "periodic": (
         lambda _, **text: pdmp.GP().regress([0.0, 1.0], [[0.0], [1.0]], **text),

@@ -14,7 +14,7 @@ PAGES = sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
 # Their snippets issue the warnings that they explain.
 WARNING = {"troubleshooting.md", "howto/styles-and-smoothing.md"}
 FENCE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
-MODULES = ("io", "preprocessing", "evaluation", "plot", "datasets", "robots")
+MODULES = ("io", "preprocessing", "evaluation", "plot", "datasets", "robots", "autodiff")
 
 
 def text(page: str) -> str:

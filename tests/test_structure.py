@@ -32,6 +32,7 @@ FOREIGN_METHODS = frozenset(
             "map",
             "next",
             "reduce",
+            "replace",
             "row",
             "rows",
             "shape",

@@ -21,6 +21,7 @@ from pdmp._native import (
     Conditions,
     ContextMap,
     Controller,
+    Controllers,
     Demonstration,
     Factors,
     FitError,
@@ -47,7 +48,7 @@ from pdmp._native import (
 from pdmp.realtime import PacedLoop, Tick
 
 if _TYPE_CHECKING:
-    from pdmp import datasets, evaluation, robots
+    from pdmp import autodiff, datasets, evaluation, robots
     from pdmp.evaluation import evaluate
 else:
 
@@ -55,7 +56,7 @@ else:
         """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
             return _import_module("pdmp.evaluation").evaluate
-        if name in ("datasets", "evaluation", "robots"):
+        if name in ("autodiff", "datasets", "evaluation", "robots"):
             return _import_module(f"pdmp.{name}")
         raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
 
@@ -70,6 +71,7 @@ __all__ = [
     "Conditions",
     "ContextMap",
     "Controller",
+    "Controllers",
     "Demonstration",
     "Factors",
     "FitError",
@@ -91,6 +93,7 @@ __all__ = [
     "Trajectory",
     "ViaPoint",
     "__version__",
+    "autodiff",
     "blend",
     "datasets",
     "evaluate",

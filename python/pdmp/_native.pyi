@@ -28,12 +28,16 @@ _Demo: TypeAlias = Demonstration | Trajectory | ArrayLike
 _Demos: TypeAlias = Sequence[_Demo] | Mapping[str, _Demo] | ArrayLike
 _Kernel: TypeAlias = Literal["matern32", "matern52"]
 _Order: TypeAlias = Literal["wxyz", "xyzw"]
+_Variable: TypeAlias = Literal[
+    "style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude", "tau"
+]
 
 __all__ = [
     "AdditionalForcing",
     "Conditions",
     "ContextMap",
     "Controller",
+    "Controllers",
     "Demonstration",
     "Factors",
     "FitError",
@@ -944,6 +948,68 @@ class Model:
         >>> positions.shape
         (5, 13, 2)
         """
+    def rollouts_vjp(
+        self,
+        wrt: _Variable | Sequence[_Variable],
+        cotangents: ArrayLike | tuple[ArrayLike, ...],  # each (B, T, D)
+        conditions: Conditions | Sequence[Conditions] | None = None,
+        *,
+        dt: float = 0.01,
+        duration: float | None = None,
+        context: _Context | _Contexts | None = None,
+        threads: int | None = None,
+        **changes: Unpack[_Changes],  # vectors (n,) or (B, n)
+    ) -> tuple[_Array, ...]:  # each (B, n) or (B,)
+        """Computes the gradients of a function of many movements with respect to their conditions.
+
+        For a function L of the results of `rollouts`, with the cotangents v = ∂L/∂y, returns the vector-Jacobian products
+        ∂L/∂x = Σ_t v(t)·∂y(t)/∂x of the conditions x. A movement is linear in all conditions but tau, so that the products
+        are exact; no Jacobian is formed, and a call takes about as long as `rollouts`. With respect to tau, they hold at
+        fixed times. `pdmp.autodiff` wraps both calls for torch and jax.
+
+        Parameters
+        ----------
+        wrt : str or sequence of str
+            Conditions x: "style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude" or "tau".
+        cotangents : array_like, (B, T, D), or tuple of array_like
+            ∂L/∂y of the positions, or of positions, velocities and accelerations as far as L depends on them.
+        conditions : Conditions, or B Conditions, optional
+            As in `rollouts`.
+        context : array_like or list, (Q,) or (B, Q), optional
+            As in `rollouts`.
+        dt, duration : float, optional
+            As in `rollouts`.
+        threads : int, optional
+            As in `rollouts`.
+        **changes
+            As in `rollouts`.
+
+        Returns
+        -------
+        tuple of ndarray
+            ∂L/∂x in the order of `wrt`: (B, J) for the style, (B,) for amplitude and tau, else (B, D). Row b is the
+            gradient by the condition of movement b; the gradient by a condition that all share is the sum of the rows.
+
+        Raises
+        ------
+        ValueError
+            An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind
+            of primitive; a velocity or start of which there is none to differentiate by; tau with accelerations; or a
+            model with rotations.
+        TypeError
+            As in `rollouts`.
+
+        Examples
+        --------
+        >>> goals = model.goals + 0.1
+        >>> (positions,) = model.rollouts(goal=goals, style=model.styles, dt=0.1, derivatives=0)
+        >>> loss, cotangents = 0.5 * (positions**2).sum(), positions
+        >>> by_style, by_goal = model.rollouts_vjp(
+        ...     ["style", "goal"], cotangents, goal=goals, style=model.styles, dt=0.1
+        ... )
+        >>> by_style.shape, by_goal.shape
+        ((5, 2), (5, 2))
+        """
     def rollout_chunks(
         self,
         conditions: Conditions | Sequence[Conditions] | None = None,
@@ -1162,7 +1228,7 @@ class Model:
         """
     def jacobian(
         self,
-        wrt: Literal["style", "goal", "anchor", "start", "goal_velocity"],
+        wrt: _Variable,
         conditions: Conditions | None = None,
         *,
         derivative: int = 0,  # at most 2
@@ -1170,16 +1236,17 @@ class Model:
         duration: float | None = None,
         context: _Context | None = None,
         **changes: Unpack[_Changes],
-    ) -> _Array:  # (T, D, J) or (T, D, D)
+    ) -> _Array:  # (T, D, J), (T, D, 1) or (T, D, D)
         """Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
 
-        A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
-        Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
-        `velocity` and `goal_velocity`.
+        A movement is linear in all conditions but tau: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same Jacobian for
+        all values of v. It depends on tau, and on the presence of `start`, `velocity` and `goal_velocity`; that by the
+        style also on the amplitude, and that by the amplitude on the style. With respect to tau it is the derivative at
+        fixed times, with velocities among the conditions constant. `rollouts_vjp` gives gradients without a Jacobian.
 
         Parameters
         ----------
-        wrt : {"style", "goal", "anchor", "start", "goal_velocity"}
+        wrt : {"style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude", "tau"}
             Condition v.
         conditions : Conditions, optional
             Conditions at the start.
@@ -1196,13 +1263,15 @@ class Model:
 
         Returns
         -------
-        ndarray, (T, D, J) or (T, D, D)
-            ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style.
+        ndarray, (T, D, J), (T, D, 1) or (T, D, D)
+            ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style, (T, D, 1) for
+            amplitude and tau.
 
         Raises
         ------
         ValueError
-            Conditions that `rollout` rejects, a condition of the other kind of primitive, or several segment durations.
+            Conditions that `rollout` rejects, a condition of the other kind of primitive, several segment durations, or
+            tau with accelerations.
 
         Examples
         --------
@@ -1599,6 +1668,59 @@ class Model:
         References
         ----------
         Pham, Pham, IEEE Transactions on Robotics 34(3), 2018, doi:10.1109/TRO.2018.2819195.
+        """
+    def controllers(
+        self,
+        n_movements: int,
+        dt: float = 0.001,
+        conditions: Conditions | Sequence[Conditions] | None = None,
+        *,
+        limits: Limits | None = None,
+        transition: float | None = None,
+        context: _Context | _Contexts | None = None,
+        out: Sequence[_Array] | None = None,  # three arrays (B, D)
+        **changes: Unpack[_Changes],  # one value, or rows (B, n)
+    ) -> Controllers:
+        """Starts many movements that are computed together, tick by tick.
+
+        Parameters
+        ----------
+        n_movements : int
+            Number B of movements.
+        dt : float
+            Length of a tick in s.
+        conditions : Conditions, or B Conditions, optional
+            Conditions of all movements at the start, or of each.
+        limits : Limits, optional
+            Limits of every movement, see `Controller.limits`.
+        transition : float, optional
+            As in `controller`.
+        context : array_like or list, (Q,) or (B, Q), optional
+            Context of all movements, or of each, whose prediction supplies absent conditions.
+        out : tuple of ndarray, (B, D), optional
+            Writable float64 arrays, contiguous by rows, for positions, velocities and accelerations.
+        **changes
+            Single conditions by name, as in `rollout`; each may have a leading axis, with one row for each movement.
+
+        Returns
+        -------
+        Controllers
+
+        Raises
+        ------
+        ValueError
+            An argument that `controller` rejects, no movement, or rows or `out` that do not fit.
+        TypeError
+            As in `controller`.
+
+        Examples
+        --------
+        >>> goals = [[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]]
+        >>> controllers = model.controllers(3, dt=0.01, goal=goals)
+        >>> while controllers.step().any():
+        ...     pass
+        >>> np.allclose(controllers.position, goals, atol=0.01)
+        True
         """
     def controller(
         self,
@@ -2675,6 +2797,146 @@ class Controller:
         """Gains (k_s, k_t) of the tracking error: phase stopping, and pull per unit of u. 0 disables each."""
     @compliance.setter
     def compliance(self, compliance: tuple[float, float], /) -> None: ...
+
+@final
+class Controllers:
+    """Running movements of one model, returned by `Model.controllers`.
+
+    `step` advances B movements by one tick and writes `position`, `velocity` and `acceleration`, which are arrays of numpy
+    that remain the same. Each movement is that of a `Controller` of its own, to the bit: `controllers[b]` is a copy of it,
+    and `controllers[b] = controller` puts one in its place.
+    """
+    def step(
+        self,
+        *,
+        style: ArrayLike | None = None,  # (B, J) or (J,)
+        goal: ArrayLike | None = None,  # (B, D) or (D,)
+        goal_velocity: ArrayLike | None = None,
+        anchor: ArrayLike | None = None,
+        tau: ArrayLike | None = None,  # (B,) or a number
+        amplitude: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
+        measured: ArrayLike | None = None,  # (B, D) or (D,)
+        phase: ArrayLike | None = None,  # (B,) or a number
+        mask: ArrayLike | None = None,  # (B,) of bool
+    ) -> NDArray[np.bool_]:  # (B,)
+        """Advances movements by one tick.
+
+        Commands are those of a `Controller`: an absent one leaves its quantity unchanged, a repeated one has no effect. Each
+        has one row for each movement, or is one vector or number for all. Movements that `mask` leaves out neither move nor
+        take commands, and their rows of the outputs keep their values.
+
+        Parameters
+        ----------
+        style : array_like, (B, J) or (J,), optional
+            New styles.
+        goal, anchor : array_like, (B, D) or (D,), optional
+            New goals of discrete, anchors of rhythmic movements.
+        goal_velocity : array_like, (B, D) or (D,), optional
+            New final velocities of discrete movements, per s.
+        tau : array_like, (B,), or float, optional
+            New time constants in s.
+        amplitude : array_like, (B,), or float, optional
+            New amplitudes of rhythmic movements.
+        speed : array_like, (B,), or float, optional
+            New speeds along the path, see `Controller.speed`.
+        measured : array_like, (B, D), optional
+            Measured positions, see `Controller.step`.
+        phase : array_like, (B,), optional
+            Measured phases of rhythmic movements in rad, see `Controller.step`.
+        mask : array_like of bool, (B,), optional
+            True for the movements of this tick; by default all.
+
+        Returns
+        -------
+        ndarray of bool, (B,)
+            `working`: False for movements that have settled on their goals.
+
+        Raises
+        ------
+        ValueError
+            A shape is wrong, a number is not finite, or `Controller` rejects a command. No movement is changed then.
+
+        Examples
+        --------
+        >>> controllers = model.controllers(4, dt=0.01)
+        >>> _ = controllers.step(goal=model.goals[:4], tau=[0.8, 1.0, 1.2, 1.4])
+        >>> _ = controllers.step(mask=[True, True, False, True])
+        >>> controllers.time.round(2)
+        array([0.02, 0.02, 0.01, 0.02])
+        """
+    def reset(
+        self,
+        movements: ArrayLike | None = None,  # (N,) of indices, or (B,) of bool
+        conditions: Conditions | Sequence[Conditions] | None = None,
+        *,
+        context: _Context | _Contexts | None = None,
+        **changes: Unpack[_Changes],  # one value, or rows (N, n)
+    ) -> None:
+        """Restarts movements.
+
+        Parameters
+        ----------
+        movements : array_like of int or bool, optional
+            Indices of the N movements to restart, or a mask (B,); by default all.
+        conditions : Conditions, or N Conditions, optional
+            Conditions of these movements at the start, or of each, as in `Controller.reset`.
+        context : array_like or list, (Q,) or (N, Q), optional
+            Context of these movements, or of each, whose prediction supplies absent conditions.
+        **changes
+            Single conditions by name; each may have a leading axis, with one row for each of these movements.
+
+        Raises
+        ------
+        ValueError
+            A movement that does not exist, or conditions that `Model.controllers` rejects. No movement is changed then.
+
+        Examples
+        --------
+        >>> controllers = model.controllers(4, dt=0.01)
+        >>> for _ in range(1000):
+        ...     working = controllers.step(mask=controllers.working)
+        >>> controllers.reset(~working, goal=[1.1, 0.0])
+        >>> bool(controllers.working.all())
+        True
+        """
+    def release(self, movements: ArrayLike | None = None) -> None:
+        """Discards measured positions.
+
+        Parameters
+        ----------
+        movements : array_like of int or bool, optional
+            Indices of movements, or a mask (B,); by default all.
+
+        Raises
+        ------
+        ValueError
+            A movement that does not exist.
+        """
+    @property
+    def position(self) -> _Array:  # (B, D) or (B, nq), written by each tick
+        """Positions y (B, D), or (B, nq) in coordinates; the array that every tick writes."""
+    @property
+    def velocity(self) -> _Array:  # (B, D), written by each tick
+        """Velocities (B, D) per s; the array that every tick writes."""
+    @property
+    def acceleration(self) -> _Array:  # (B, D), written by each tick
+        """Accelerations (B, D) per s²; the array that every tick writes."""
+    @property
+    def working(self) -> NDArray[np.bool_]:  # (B,), written by each tick
+        """False for movements that have settled on their goals (B,); the array that every tick writes."""
+    @property
+    def time(self) -> _Array:  # (B,)
+        """Times (B,) since the start in s."""
+    @property
+    def phase(self) -> _Array:  # (B,)
+        """Phases (B,): x in (0, 1] of discrete movements, φ in [0, 2π) rad of rhythmic ones."""
+    @property
+    def dt(self) -> float:
+        """Length of a tick in s."""
+    def __len__(self) -> int: ...
+    def __getitem__(self, movement: int, /) -> Controller: ...
+    def __setitem__(self, movement: int, controller: Controller, /) -> None: ...
 
 @final
 class GP:

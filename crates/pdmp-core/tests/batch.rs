@@ -251,19 +251,37 @@ fn jacobians_are_differences_of_rollouts() {
             };
             let rollout = |conditions: &Conditions| rollout(model.primitive(), conditions, grid(0.01, 1.5)).unwrap();
             let centre = if discrete { WithRespectTo::Goal } else { WithRespectTo::Anchor };
-            for variable in [WithRespectTo::Style, centre, WithRespectTo::Start, WithRespectTo::GoalVelocity] {
+            let variables = [
+                WithRespectTo::Style,
+                centre,
+                WithRespectTo::Start,
+                WithRespectTo::Velocity,
+                WithRespectTo::GoalVelocity,
+                WithRespectTo::Amplitude,
+            ];
+            for variable in variables {
                 let absent = match variable {
                     WithRespectTo::Start => base.start.is_none() && !discrete,
+                    WithRespectTo::Velocity => base.velocity.is_none(),
+                    WithRespectTo::Amplitude => discrete,
                     WithRespectTo::GoalVelocity => base.goal_velocity.is_none(),
                     _ => false,
                 };
                 if absent {
                     continue;
                 }
-                let entries = if variable == WithRespectTo::Style { 2 } else { n };
+                let entries = match variable {
+                    WithRespectTo::Style => 2,
+                    WithRespectTo::Amplitude => 1,
+                    _ => n,
+                };
                 for entry in 0..entries {
                     let mut moved = base.clone();
+                    let mut amplitude = base.amplitude.map(|amplitude| vec![amplitude]);
                     let condition = match variable {
+                        WithRespectTo::Amplitude => &mut amplitude,
+                        WithRespectTo::Velocity => &mut moved.velocity,
+                        WithRespectTo::Tau => unreachable!("a movement is not linear in tau"),
                         WithRespectTo::Style => &mut moved.style,
                         WithRespectTo::Goal => &mut moved.goal,
                         WithRespectTo::Anchor => &mut moved.anchor,
@@ -272,6 +290,7 @@ fn jacobians_are_differences_of_rollouts() {
                     };
                     let nominal = || model.demonstrated().starts.row(model.demonstrated().nominal).to_vec();
                     condition.get_or_insert_with(nominal)[entry] += 0.5;
+                    moved.amplitude = amplitude.map(|amplitude| amplitude[0]);
                     let (ahead, behind) = (rollout(&moved), rollout(&base));
                     for order in Derivative::ALL {
                         let slope = (of(&ahead, order) - of(&behind, order)) / 0.5;

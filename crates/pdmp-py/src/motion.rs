@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use numpy::IntoPyArray;
 use pdmp_core::model::Derivative;
-use pdmp_core::motion::{TimeGrid, WithRespectTo, fastest, fastest_tau, jacobian, rollout_with};
+use pdmp_core::motion::{TimeGrid, fastest, fastest_tau, jacobian, rollout_with};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -13,6 +13,7 @@ use crate::conditions::conditions_of;
 use crate::controller::Controller;
 use crate::convert::Cube;
 use crate::error::{interruptible, raise};
+use crate::gradients::VARIABLES;
 use crate::instance;
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
@@ -265,13 +266,14 @@ impl Model {
 
     /// Computes the Jacobian ∂y/∂v of a rollout with respect to one of its conditions v.
     ///
-    /// A movement is linear in style, goal, anchor and start: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same
-    /// Jacobian for all their values. It depends on tau, on the amplitude, and on the presence of `start`,
-    /// `velocity` and `goal_velocity`.
+    /// A movement is linear in all conditions but tau: y(v + Δv) = y(v) + (∂y/∂v)Δv exactly, with the same Jacobian for
+    /// all values of v. It depends on tau, and on the presence of `start`, `velocity` and `goal_velocity`; that by the
+    /// style also on the amplitude, and that by the amplitude on the style. With respect to tau it is the derivative at
+    /// fixed times, with velocities among the conditions constant. `rollouts_vjp` gives gradients without a Jacobian.
     ///
     /// Parameters
     /// ----------
-    /// wrt : {"style", "goal", "anchor", "start", "goal_velocity"}
+    /// wrt : {"style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude", "tau"}
     ///     Condition v.
     /// conditions : Conditions, optional
     ///     Conditions at the start.
@@ -288,13 +290,15 @@ impl Model {
     ///
     /// Returns
     /// -------
-    /// ndarray, (T, D, J) or (T, D, D)
-    ///     ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style.
+    /// ndarray, (T, D, J), (T, D, 1) or (T, D, D)
+    ///     ∂y/∂v in the unit of y per unit of v, at the samples of `rollout`; (T, D, J) for the style, (T, D, 1) for
+    ///     amplitude and tau.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     Conditions that `rollout` rejects, a condition of the other kind of primitive, or several segment durations.
+    ///     Conditions that `rollout` rejects, a condition of the other kind of primitive, several segment durations, or
+    ///     tau with accelerations.
     ///
     /// Examples
     /// --------
@@ -323,14 +327,7 @@ impl Model {
         context: Option<&Bound<'py, PyAny>>,
         changes: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Cube<'py>> {
-        let variables = [
-            ("style", WithRespectTo::Style),
-            ("goal", WithRespectTo::Goal),
-            ("anchor", WithRespectTo::Anchor),
-            ("start", WithRespectTo::Start),
-            ("goal_velocity", WithRespectTo::GoalVelocity),
-        ];
-        let wrt = wrt.of("wrt", &variables)?;
+        let wrt = wrt.of("wrt", &VARIABLES)?;
         let derivative = Derivative::of_order("derivative", derivative.count("derivative")?).map_err(raise)?;
         let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
         let conditions = conditions_of(&self.0, conditions, context, changes)?;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ndarray::{Array3, ArrayViewMut3, Axis, aview1, s};
 
 use crate::error::{Error, Result};
+use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
@@ -18,11 +19,11 @@ use crate::numerics::threads::Threads;
 use crate::validate::{check_range, row_major, zeros};
 
 /// Number of elements of each output that one thread writes per block.
-const BLOCK: usize = 1 << 17;
+pub(super) const BLOCK: usize = 1 << 17;
 /// Minimum number of movements per block, so that a tile of the responses is read from cache several times.
-const MIN_MOVEMENTS_PER_BLOCK: usize = 8;
+pub(super) const MIN_MOVEMENTS_PER_BLOCK: usize = 8;
 /// Number of blocks per thread between two calls of `progress`.
-const PROGRESS_INTERVAL: usize = 16;
+pub(super) const PROGRESS_INTERVAL: usize = 16;
 
 /// Checked movements of a batch, ready to be computed as a whole or in parts, with bitwise equal results.
 ///
@@ -48,19 +49,23 @@ const PROGRESS_INTERVAL: usize = 16;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Batch {
-    responses: Arc<Responses>,
+    pub(super) responses: Arc<Responses>,
     n_movements: usize,
-    styles: PerMovement,
+    pub(super) kind: Kind,
+    pub(super) styles: PerMovement,
     /// Goals of discrete, anchors of rhythmic movements.
     centres: PerMovement,
-    starts: Option<PerMovement>,
-    velocities: Option<PerMovement>,
-    goal_velocities: Option<PerMovement>,
-    amplitude: f64,
+    pub(super) starts: Option<PerMovement>,
+    pub(super) velocities: Option<PerMovement>,
+    pub(super) goal_velocities: Option<PerMovement>,
+    pub(super) amplitude: f64,
     /// True if the last curves of the responses are the displacement by an additional forcing.
     is_forced: bool,
-    /// Primitive with rotations, sampling interval in s, and rate 1/τ.
-    pose: Option<(Arc<Primitive>, f64, f64)>,
+    pub(super) tau: f64,
+    /// Sampling interval, in s.
+    pub(super) dt: f64,
+    /// Primitive with rotations.
+    pub(super) pose: Option<Arc<Primitive>>,
 }
 
 /// Checks the conditions of a batch and computes the unit responses, unless the primitive has them in its cache.
@@ -91,13 +96,16 @@ pub fn batch(
         responses,
         is_forced: forcing.is_some(),
         n_movements,
+        kind: primitive.kind(),
         styles: style.unwrap_or(PerMovement::All(nominal.style)),
         centres: goal.or(anchor).unwrap_or(PerMovement::All(nominal.centre)),
         starts: start.or(nominal.start.map(PerMovement::All)),
         velocities: velocity,
         goal_velocities: goal_velocity,
         amplitude: nominal.amplitude,
-        pose: outside.coordinates().is_some().then(|| (Arc::clone(outside), grid.dt, 1.0 / nominal.tau)),
+        tau: nominal.tau,
+        dt: grid.dt,
+        pose: outside.coordinates().is_some().then(|| Arc::clone(outside)),
     })
 }
 
@@ -106,6 +114,11 @@ impl Batch {
     pub fn shape(&self) -> (usize, usize, usize) {
         let (n_samples, n_dofs) = self.responses.of(Derivative::Position).start.dim();
         (self.n_movements, n_samples, n_dofs)
+    }
+
+    /// Returns the number of style parameters.
+    pub(super) fn n_styles(&self) -> usize {
+        self.responses.of(Derivative::Position).styles.len() - usize::from(self.is_forced)
     }
 
     /// Returns the number of columns of positions, or of a derivative: coordinates or DoFs.
@@ -125,7 +138,7 @@ impl Batch {
     /// ```
     pub fn n_columns(&self, derivative: Derivative) -> usize {
         match &self.pose {
-            Some((primitive, ..)) if derivative == Derivative::Position => primitive.n_coordinates(),
+            Some(primitive) if derivative == Derivative::Position => primitive.n_coordinates(),
             _ => self.shape().2,
         }
     }
@@ -249,14 +262,9 @@ impl Batch {
     }
 
     /// Writes the movements of consecutive combinations in coordinates.
-    fn write_poses(
-        &self,
-        (primitive, dt, rate): &(Arc<Primitive>, f64, f64),
-        combinations: &[Combination],
-        mut outputs: Vec<ArrayViewMut3<f64>>,
-    ) {
+    fn write_poses(&self, primitive: &Primitive, combinations: &[Combination], mut outputs: Vec<ArrayViewMut3<f64>>) {
         let Some(coordinates) = primitive.coordinates() else { return };
-        let (_, n_samples, n_dofs) = self.shape();
+        let ((_, n_samples, n_dofs), rate) = (self.shape(), 1.0 / self.tau);
         let mut dofs = [(); 3].map(|()| Array3::zeros((1, n_samples, n_dofs)));
         let mut moved = [vec![0.0; coordinates.n_coordinates()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
         for (b, combination) in combinations.iter().enumerate() {
@@ -268,7 +276,7 @@ impl Batch {
             for k in 0..n_samples {
                 let rows = dofs.each_ref().map(|dofs| &row_major(dofs)[k * n_dofs..][..n_dofs]);
                 let [position, velocity, acceleration] = &mut moved;
-                coordinates.motion(k as f64 * dt * rate, [*rate, 0.0], rows, position, velocity, acceleration);
+                coordinates.motion(k as f64 * self.dt * rate, [rate, 0.0], rows, position, velocity, acceleration);
                 for (output, moved) in outputs.iter_mut().zip(&moved) {
                     output.slice_mut(s![b, k, ..]).assign(&aview1(moved));
                 }
@@ -277,7 +285,7 @@ impl Batch {
     }
 
     /// Returns the coefficients of movement `b`.
-    fn combination(&self, b: usize) -> Combination {
+    pub(super) fn combination(&self, b: usize) -> Combination {
         let displacement = self.is_forced.then_some(1.0);
         let style: Vec<f64> = self.styles.row(b).iter().map(|s| self.amplitude * s).chain(displacement).collect();
         let centre = self.centres.row(b).to_vec();

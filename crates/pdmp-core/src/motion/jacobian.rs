@@ -26,26 +26,51 @@ pub enum WithRespectTo {
     Anchor,
     /// Start position y(0) (D,).
     Start,
+    /// Start velocity ẏ(0) (D,).
+    Velocity,
     /// Final velocity ẏ_g (D,) of a discrete movement.
     GoalVelocity,
+    /// Amplitude r₀ of a rhythmic movement.
+    Amplitude,
+    /// Time constant τ, at fixed times.
+    Tau,
 }
 
-/// Computes the Jacobian of a rollout: (T, D, J) with respect to the style, (T, D, D) otherwise.
+impl WithRespectTo {
+    /// Refuses a condition that this kind of primitive does not have, and the derivative that needs a third one of time.
+    pub(crate) fn check(self, kind: Kind, highest: Derivative) -> Result<()> {
+        reject_for_kind(kind, "goal", self == Self::Goal && kind == Kind::Rhythmic)?;
+        reject_for_kind(kind, "anchor", self == Self::Anchor && kind == Kind::Discrete)?;
+        reject_for_kind(kind, "amplitude", self == Self::Amplitude && kind == Kind::Discrete)?;
+        if self == Self::Tau && highest == Derivative::Acceleration {
+            return Err(Error::Argument {
+                name: "tau",
+                problem: "does not apply to accelerations: their derivative by tau needs the jerk; use velocities",
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Computes the Jacobian of a rollout: (T, D, J) with respect to the style, (T, D, 1) to amplitude and τ, else (T, D, D).
 ///
-/// A movement is linear in these conditions, so that the Jacobian is exact and independent of their values:
+/// A movement is linear in all conditions but τ, so that the Jacobian is exact and independent of their values:
 ///
 /// ```text
 /// ∂y/∂sⱼ = r₀(Rⱼ − Rⱼ(0)·E − Ṙⱼ(0)·V)
 /// ∂y/∂g = 1 − E
 /// ∂y/∂y_a = 1, or 1 − E if a start is given
 /// ∂y/∂y(0) = E
+/// ∂y/∂ẏ(0) = V
 /// ∂y/∂ẏ_g = G
+/// ∂y/∂r₀ = Σⱼ sⱼ(∂y/∂sⱼ)/r₀
+/// ∂y⁽ᵏ⁾/∂τ = (−k·y⁽ᵏ⁾ − t·y⁽ᵏ⁺¹⁾ + ẏ(0)·V⁽ᵏ⁾ + ẏ_g·G⁽ᵏ⁾)/τ
 /// ```
 ///
 /// with the responses R to the unit styles, E to a unit start, V to a unit start velocity and G to a unit final velocity. If
-/// a final velocity is given, all responses keep it. The terms with E and V apply
-/// only if a start or a start velocity is given. `derivative` selects y, ẏ or ÿ. `progress` is called periodically with the
-/// completed fraction; an error it returns cancels the call.
+/// a final velocity is given, all responses keep it. The terms with E and V apply only if a start or a start velocity is
+/// given. τ scales time, and velocities given per second keep their values. `derivative` selects y, ẏ or ÿ. `progress` is
+/// called periodically with the completed fraction; an error it returns cancels the call.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
@@ -77,15 +102,15 @@ pub fn jacobian(
         return in_coordinates(coordinates, variable, derivative, conditions, grid, progress);
     }
     let kind = primitive.kind();
-    reject_for_kind(kind, "goal", variable == WithRespectTo::Goal && kind == Kind::Rhythmic)?;
-    reject_for_kind(kind, "anchor", variable == WithRespectTo::Anchor && kind == Kind::Discrete)?;
+    variable.check(kind, derivative)?;
     if conditions.segment_durations.as_ref().is_some_and(|segment_durations| segment_durations.len() > 1) {
         return Err(Error::Argument {
             name: "segment_durations",
             problem: "does not apply: Jacobians are available in linear time only; pass tau instead",
         });
     }
-    let conditions = conditions.complete(primitive)?;
+    let given = conditions;
+    let conditions = given.complete(primitive)?;
     let by_goal_velocity = variable == WithRespectTo::GoalVelocity;
     reject_goal_velocity(primitive, by_goal_velocity)?;
     let has_goal_velocity = conditions.has_goal_velocity || by_goal_velocity;
@@ -95,11 +120,23 @@ pub fn jacobian(
     let one = if derivative == Derivative::Position { 1.0 } else { 0.0 };
     match variable {
         WithRespectTo::Style => by_style(&responses, derivative, &conditions),
+        WithRespectTo::Amplitude => by_amplitude(&responses, derivative, conditions),
+        WithRespectTo::Tau => {
+            let movement = rollout(primitive, given, grid)?;
+            by_tau(
+                &responses,
+                derivative,
+                &conditions,
+                [movement.position, movement.velocity, movement.acceleration],
+                grid,
+            )
+        }
         WithRespectTo::Goal | WithRespectTo::Anchor if conditions.start.is_some() => {
             by_dof(&curves.start, |response| one - response)
         }
         WithRespectTo::Goal | WithRespectTo::Anchor => by_dof(&curves.start, |_| one),
         WithRespectTo::Start => by_dof(&curves.start, |response| response),
+        WithRespectTo::Velocity => by_dof(&curves.velocity, |response| response),
         WithRespectTo::GoalVelocity => {
             let curve = curves.goal_velocity.as_ref().expect("responses with a final velocity were computed above");
             by_dof(curve, |response| response)
@@ -124,6 +161,38 @@ fn by_style(responses: &Responses, derivative: Derivative, conditions: &Resolved
         if conditions.velocity.is_some() {
             subtract(Derivative::Velocity, &curves.velocity);
         }
+    }
+    Ok(jacobian)
+}
+
+/// Returns the Jacobian (T, D, 1) with respect to the amplitude.
+fn by_amplitude(responses: &Responses, derivative: Derivative, conditions: ResolvedConditions) -> Result<Array3<f64>> {
+    let conditions = ResolvedConditions { amplitude: 1.0, ..conditions };
+    let by_style = by_style(responses, derivative, &conditions)?;
+    let mut jacobian = zeros("jacobian", (by_style.dim().0, by_style.dim().1, 1))?;
+    for (style, by_style) in conditions.style.iter().zip(by_style.axis_iter(Axis(2))) {
+        jacobian.index_axis_mut(Axis(2), 0).scaled_add(*style, &by_style);
+    }
+    Ok(jacobian)
+}
+
+/// Returns the Jacobian (T, D, 1) with respect to τ of one order of a movement.
+fn by_tau(
+    responses: &Responses,
+    derivative: Derivative,
+    conditions: &ResolvedConditions,
+    movement: [Array2<f64>; 3],
+    grid: TimeGrid,
+) -> Result<Array3<f64>> {
+    let (order, curves, rate) = (derivative as usize, responses.of(derivative), 1.0 / conditions.tau);
+    let (n_samples, n_dofs) = curves.start.dim();
+    let mut jacobian = zeros("jacobian", (n_samples, n_dofs, 1))?;
+    for ((k, d, _), value) in jacobian.indexed_iter_mut() {
+        let time = k as f64 * grid.dt;
+        let given = conditions.velocity.as_ref().map_or(0.0, |velocity| velocity[d] * curves.velocity[[k, d]]);
+        let last = curves.goal_velocity.as_ref().map_or(0.0, |curve| conditions.goal_velocity[d] * curve[[k, d]]);
+        let own = -(order as f64) * movement[order][[k, d]] - time * movement[order + 1][[k, d]];
+        *value = (own + given + last) * rate;
     }
     Ok(jacobian)
 }
@@ -154,10 +223,15 @@ fn in_coordinates(
                        two conditions";
         return Err(Error::Argument { name: "derivative", problem });
     }
+    if matches!(variable, WithRespectTo::Velocity | WithRespectTo::Tau) {
+        let problem = "does not apply to a model with rotations, whose mean rotations move with the clock; compare rollouts \
+                       of two conditions";
+        return Err(Error::Argument { name: "wrt", problem });
+    }
     let fixed = match variable {
         WithRespectTo::Start => &conditions.velocity,
         WithRespectTo::Goal | WithRespectTo::Anchor => &conditions.goal_velocity,
-        WithRespectTo::Style | WithRespectTo::GoalVelocity => &None,
+        _ => &None,
     };
     if fixed.is_some() {
         let problem = "does not apply: the Jacobian by a start or goal with rotations is that without its velocity";
@@ -176,11 +250,9 @@ fn in_coordinates(
         });
     }
     let (u, at) = match variable {
-        WithRespectTo::Style => return Ok(of_dofs),
+        WithRespectTo::Style | WithRespectTo::Amplitude => return Ok(of_dofs),
         WithRespectTo::Start => (0.0, resolved.start.as_ref().unwrap_or(&inside.nominal.start)),
-        WithRespectTo::Goal | WithRespectTo::Anchor | WithRespectTo::GoalVelocity => {
-            (coordinates.centre_clock(), &resolved.centre)
-        }
+        _ => (coordinates.centre_clock(), &resolved.centre),
     };
     coordinates.for_each_tangent(u, at, |dof, _, backward| {
         for mut rows in of_dofs.outer_iter_mut() {

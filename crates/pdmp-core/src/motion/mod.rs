@@ -4,7 +4,9 @@ pub(crate) mod angular;
 pub(crate) mod batch;
 pub(crate) mod batch_conditions;
 pub(crate) mod command;
+mod commands;
 pub(crate) mod controller;
+mod controllers;
 pub(crate) mod fastest;
 pub(crate) mod feasibility;
 pub(crate) mod jacobian;
@@ -20,12 +22,15 @@ pub(crate) mod time_law;
 pub(crate) mod trajectory;
 mod two_arms;
 pub(crate) mod unit_responses;
+mod vector_jacobian;
 pub(crate) mod viability;
 
 pub use batch::{Batch, BatchChunks, batch};
 pub use batch_conditions::{BatchConditions, PerMovement};
 pub use command::{Command, Coupling, Motion};
+pub use commands::{Commands, Motions};
 pub use controller::{Controller, Status};
+pub use controllers::Controllers;
 pub use fastest::{fastest, fastest_tau};
 pub use feasibility::{Extreme, Margins, feasible};
 #[cfg(feature = "learning")]

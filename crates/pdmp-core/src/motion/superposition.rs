@@ -15,14 +15,19 @@ const MIN_PATTERN: usize = 64;
 /// Number of elements of a tile: its responses are read from cache for all movements of a block.
 const TILE: usize = 1024;
 
+/// Returns the number of elements of a tile for coefficients of a period: whole periods, and so whole samples.
+pub(crate) fn tile_size(period: usize) -> usize {
+    period * (TILE / period).max(1)
+}
+
 /// Coefficients of a movement y = g + s·R + Δy(0)·E + Δẏ(0)·V + ẏ_g·G.
 pub(crate) struct Combination {
-    style: Vec<f64>,
+    pub(crate) style: Vec<f64>,
     /// Coefficients g of the DoFs, repeated to at least [`MIN_PATTERN`] elements, as are the following.
-    centre: Vec<f64>,
-    start: Vec<f64>,
-    velocity: Vec<f64>,
-    goal_velocity: Option<Vec<f64>>,
+    pub(crate) centre: Vec<f64>,
+    pub(crate) start: Vec<f64>,
+    pub(crate) velocity: Vec<f64>,
+    pub(crate) goal_velocity: Option<Vec<f64>>,
 }
 
 impl Combination {
@@ -49,7 +54,7 @@ pub(crate) fn write(
     // The centre is constant: its derivatives are zero.
     let zeros = vec![0.0; period];
     let (n_dofs, length) = (output.len_of(Axis(2)), curves.start.len());
-    let tile = period * (TILE / period).max(1);
+    let tile = tile_size(period);
     let mut buffer = vec![0.0; tile];
     for from in (0..length).step_by(tile) {
         let at = from..(from + tile).min(length);
@@ -70,15 +75,15 @@ pub(crate) fn write(
 }
 
 /// Unit responses over a range of elements.
-struct Tile<'a> {
-    styles: Vec<&'a [f64]>,
-    start: &'a [f64],
-    velocity: &'a [f64],
-    goal_velocity: Option<&'a [f64]>,
+pub(crate) struct Tile<'a> {
+    pub(crate) styles: Vec<&'a [f64]>,
+    pub(crate) start: &'a [f64],
+    pub(crate) velocity: &'a [f64],
+    pub(crate) goal_velocity: Option<&'a [f64]>,
 }
 
 impl<'a> Tile<'a> {
-    fn new(curves: &'a Curves, at: Range<usize>) -> Self {
+    pub(crate) fn new(curves: &'a Curves, at: Range<usize>) -> Self {
         let part = |curve: &'a ndarray::Array2<f64>| &row_major(curve)[at.clone()];
         Self {
             styles: curves.styles.iter().map(part).collect(),
@@ -89,7 +94,7 @@ impl<'a> Tile<'a> {
     }
 
     /// Writes the tile of one movement, with the repeated coefficients `centre` of g.
-    fn sum(&self, combination: &Combination, centre: &[f64], out: &mut [f64]) {
+    pub(crate) fn sum(&self, combination: &Combination, centre: &[f64], out: &mut [f64]) {
         let Combination { style, start, velocity, .. } = combination;
         let period = centre.len();
         let responses = self.start.chunks(period).zip(self.velocity.chunks(period));

@@ -28,6 +28,7 @@ mod setters;
 mod settling;
 mod snapshot;
 mod start;
+pub(in crate::motion) mod steady;
 mod step;
 mod synchronous;
 mod turning;
@@ -328,8 +329,7 @@ impl Controller {
     /// robot therefore neither stops the movement nor keeps it from its goal. The error of a DoF in rad, deg or ° is wrapped
     /// to half a turn. A measurement remains in force, as its error e, until the next one or [`Controller::release`], so
     /// that a sensor may be slower than the loop. Coupling terms add c_v to the velocity and c_a to the acceleration. The
-    /// pull over a tick of `dt` seconds and h on the clock is the velocity d(1 − exp(−k_t h))/dt: for any length of the tick
-    /// it does not overshoot ỹ.
+    /// pull over a tick of `dt` seconds and h on the clock is the velocity d(1 − exp(−k_t h))/dt, which never overshoots ỹ.
     ///
     /// A measured phase φ* pulls the phase of a rhythmic movement with the gain of [`Controller::set_phase_gain`]; the pull
     /// is the mean over the tick of the exact solution, so that it does not overshoot φ*.

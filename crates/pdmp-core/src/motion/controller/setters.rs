@@ -164,12 +164,7 @@ impl Controller {
     /// # Errors
     /// A speed outside [0, 1e6]. It then remains unchanged.
     pub fn set_speed(&mut self, speed: f64) -> Result<()> {
-        let unlimited = speed == f64::INFINITY && self.governor.is_some();
-        if !((0.0..=1e6).contains(&speed) || unlimited) {
-            let allowed = "must lie between 0, a pause, and 1e6, or be infinite within synchronous limits of velocity or \
-                           acceleration";
-            return Err(Error::Range { name: "speed", value: speed, allowed });
-        }
+        self.check_speed(speed)?;
         self.speed = speed;
         let rate = [self.commanded_rate()];
         if self.started {
@@ -177,6 +172,17 @@ impl Controller {
             self.publish();
         } else {
             self.begin();
+        }
+        Ok(())
+    }
+
+    /// Checks a speed.
+    pub(in crate::motion) fn check_speed(&self, speed: f64) -> Result<()> {
+        let unlimited = speed == f64::INFINITY && self.governor.is_some();
+        if !((0.0..=1e6).contains(&speed) || unlimited) {
+            let allowed = "must lie between 0, a pause, and 1e6, or be infinite within synchronous limits of velocity or \
+                           acceleration";
+            return Err(Error::Range { name: "speed", value: speed, allowed });
         }
         Ok(())
     }

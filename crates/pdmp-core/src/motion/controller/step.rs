@@ -11,15 +11,15 @@ use crate::motion::perturbation::PerturbationTerms;
 use crate::numerics::simd::{F64x4, Kernel, Register, compute, flush, unpack};
 
 /// Maximum number of substeps of a tick. A tick that needs more is still stable, but less accurate.
-const MAX_SUBSTEPS: f64 = 1000.0;
+pub(super) const MAX_SUBSTEPS: f64 = 1000.0;
 /// Maximum length of a tick, in units of τ.
 const MAX_TICK: f64 = 1000.0;
 /// Relative rounding error of a substep that ends at u_end.
-const ROUNDING: f64 = 1e-9;
+pub(super) const ROUNDING: f64 = 1e-9;
 
 impl Controller {
     /// Checks that a tick is not too long for the present rate and the commanded one.
-    pub(super) fn check_tick_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
+    pub(in crate::motion) fn check_tick_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
         let commanded = tau.map_or(first_element(self.rate.target()), |tau| {
             if self.speed.is_infinite() { self.commanded_rate() } else { self.speed / tau }
         });

@@ -1,0 +1,358 @@
+//! Many movements of one primitive, stepped together.
+
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::model::conditions::Conditions;
+use crate::model::primitive::Primitive;
+use crate::motion::command::Motion;
+use crate::motion::commands::{Commands, Motions};
+use crate::motion::controller::steady::{Rows, SteadyMovements};
+use crate::motion::controller::{Controller, Status};
+use crate::motion::limits::Limits;
+use crate::validate::{check_length, check_range};
+
+/// Controllers of B movements of one primitive, with ticks of one length.
+///
+/// Each moves as a [`Controller`] of its own would, to the bit. Between changes of their commands, movements are kept in
+/// compact memory and advanced in one loop; a movement in transition, within limits, perturbed, past its end or with
+/// rotations takes the tick of its controller. After [`Controllers::new`], ticks and commands do not allocate.
+///
+/// ```
+/// use ndarray::array;
+/// use pdmp_core::motion::{Commands, Controllers, Motions};
+/// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, Status, fit};
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let mut controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 2], None)?;
+/// let (mut y, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+/// let mut motions = Motions { position: &mut y, velocity: &mut v, acceleration: &mut a };
+/// let goals = array![[1.2, 0.1], [0.9, 0.0]];
+/// controllers.update(&Commands { goal: Some(goals.view()), ..Commands::default() }, None, &mut motions)?;
+/// while controllers.statuses().contains(&Status::Working) {
+///     controllers.step(None, &mut motions)?;
+/// }
+/// assert!((motions.position[0] - 1.2).abs() < 0.01 && (motions.position[2] - 0.9).abs() < 0.01);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Controllers {
+    /// Commands of all movements, and the state of those that are not steady.
+    controllers: Vec<Controller>,
+    steady: SteadyMovements,
+    statuses: Vec<Status>,
+    /// Memory for the movements that a tick brings to their end.
+    ending: Vec<u32>,
+}
+
+impl Controllers {
+    /// Starts one movement for each of `conditions`, with the tick and the transition of [`Controller::new`].
+    ///
+    /// # Errors
+    /// As for [`Controller::new`], or no movement.
+    pub fn new(
+        primitive: &Arc<Primitive>,
+        dt: f64,
+        conditions: &[Conditions],
+        transition: Option<f64>,
+    ) -> Result<Self> {
+        let new = |conditions| Ok(Controller::new(primitive, dt, conditions, transition)?.with_prefetch(0.0));
+        let controllers = conditions.iter().map(new).collect::<Result<Vec<_>>>()?;
+        let n = controllers.len();
+        let first = controllers.first().ok_or(Error::Argument { name: "conditions", problem: "must not be empty" })?;
+        let (steady, statuses) = (SteadyMovements::new(first, n), vec![Status::Working; n]);
+        Ok(Self { controllers, steady, statuses, ending: Vec::with_capacity(n) })
+    }
+
+    /// Returns the number B of movements.
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.controllers.len()
+    }
+
+    /// Returns the primitive.
+    pub fn primitive(&self) -> &Arc<Primitive> {
+        self.controllers[0].primitive()
+    }
+
+    /// Returns the length of a tick, in seconds.
+    pub fn dt(&self) -> f64 {
+        self.controllers[0].dt()
+    }
+
+    /// Returns the status of each movement (B,) after its last tick.
+    pub fn statuses(&self) -> &[Status] {
+        &self.statuses
+    }
+
+    /// Returns the number of movements that the next tick advances in compact memory.
+    pub fn n_steady(&self) -> usize {
+        (0..self.len()).filter(|&b| self.steady.holds(b)).count()
+    }
+
+    /// Performs one tick without new commands of the movements that `mask` (B,) selects, or of all, and writes their motion.
+    ///
+    /// # Errors
+    /// A mask or outputs of a wrong length, or a tick longer than 1000 τ of a movement. No movement is changed then.
+    pub fn step(&mut self, mask: Option<&[bool]>, motions: &mut Motions) -> Result<()> {
+        self.check(mask, motions)?;
+        for (b, controller) in self.controllers.iter().enumerate() {
+            if !self.steady.holds(b) && is_selected(mask, b) {
+                controller.check_tick_length(controller.dt(), None)?;
+            }
+        }
+        self.advance(mask, motions, |controller, _| controller.step())
+    }
+
+    /// Performs one tick under commands of the movements that `mask` (B,) selects, or of all, and writes their motion.
+    ///
+    /// ```
+    /// # use pdmp_core::motion::{Commands, Controllers, Motions};
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 2], None)?;
+    /// # let (mut y, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+    /// # let mut motions = Motions { position: &mut y, velocity: &mut v, acceleration: &mut a };
+    /// let slower = Commands { tau: Some(&[2.0, 2.0]), ..Commands::default() };
+    /// controllers.update(&slower, Some(&[false, true]), &mut motions)?;
+    /// assert_eq!((controllers.get(0)?.tau(), controllers.get(1)?.tau()), (model.tau(), 2.0));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Controllers::step`] and [`Controller::update`]. No movement moves then, and of the commands only speeds take
+    /// effect.
+    pub fn update(&mut self, commands: &Commands, mask: Option<&[bool]>, motions: &mut Motions) -> Result<()> {
+        self.check(mask, motions)?;
+        commands.check(self.len())?;
+        let selected = (0..self.len()).filter(|&b| is_selected(mask, b));
+        for b in selected.clone() {
+            let controller = &self.controllers[b];
+            commands.of(b).check(controller.primitive())?;
+            commands.speed.map_or(Ok(()), |speed| controller.check_speed(speed[b]))?;
+        }
+        for b in selected {
+            if self.steady.holds(b) && self.controllers[b].is_changed_by(&commands.of(b)) {
+                self.leave(b);
+            }
+            if let Some(speed) = commands.speed
+                && speed[b] != self.controllers[b].speed()
+            {
+                self.set_speed(b, speed[b])?;
+            }
+            self.controllers[b].check_tick_length(self.dt(), commands.of(b).tau)?;
+        }
+        self.advance(mask, motions, |controller, b| controller.step_with(&commands.of(b)))
+    }
+
+    /// Restarts some movements, each under conditions of its own.
+    ///
+    /// ```
+    /// # use pdmp_core::motion::Controllers;
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let mut controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 8], None)?;
+    /// let near = Conditions { goal: Some(vec![0.5, 0.0]), ..Conditions::default() };
+    /// controllers.reset(&[2, 5], &[Conditions::default(), near])?;
+    /// assert_eq!(controllers.get(5)?.centre(), [0.5, 0.0]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A movement that does not exist, another number of conditions, or conditions that [`Controller::reset`] rejects. No
+    /// movement is changed then.
+    pub fn reset(&mut self, movements: &[usize], conditions: &[Conditions]) -> Result<()> {
+        check_length("conditions", conditions.len(), movements.len(), "movement")?;
+        movements.iter().try_for_each(|&b| self.check_index(b))?;
+        conditions.iter().try_for_each(|conditions| conditions.complete(self.primitive()).map(drop))?;
+        for (&b, conditions) in movements.iter().zip(conditions) {
+            self.steady.release(b);
+            self.controllers[b].reset(conditions)?;
+            self.statuses[b] = Status::Working;
+        }
+        Ok(())
+    }
+
+    /// Returns the controller of a movement, to read its state and commands.
+    ///
+    /// # Errors
+    /// A movement that does not exist.
+    pub fn get(&mut self, movement: usize) -> Result<&Controller> {
+        self.check_index(movement)?;
+        if self.steady.holds(movement) {
+            self.steady.write(movement, &mut self.controllers[movement]);
+        }
+        Ok(&self.controllers[movement])
+    }
+
+    /// Replaces a movement by that of a controller, for all that has no command here: gains, tolerance, a state of its own.
+    ///
+    /// ```
+    /// # use pdmp_core::motion::Controllers;
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let mut controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 8], None)?;
+    /// let mut one = controllers.get(3)?.clone();
+    /// one.set_tolerance(1e-3)?;
+    /// controllers.replace(3, &one)?;
+    /// assert_eq!(controllers.get(3)?.tolerance(), 1e-3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A movement that does not exist, or a controller of another primitive or tick.
+    pub fn replace(&mut self, movement: usize, controller: &Controller) -> Result<()> {
+        if !Arc::ptr_eq(controller.primitive(), self.primitive()) || controller.dt() != self.dt() {
+            let problem = "must have the primitive and the tick of the others";
+            return Err(Error::Argument { name: "controller", problem });
+        }
+        self.with(movement, |present| {
+            present.clone_from(controller);
+            Ok(())
+        })
+    }
+
+    /// Sets the speed of a movement, as [`Controller::set_speed`].
+    ///
+    /// ```
+    /// # use pdmp_core::motion::Controllers;
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let mut controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 8], None)?;
+    /// controllers.set_speed(3, 0.0)?;
+    /// assert_eq!(controllers.get(3)?.speed(), 0.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A movement that does not exist, or a speed that [`Controller::set_speed`] rejects.
+    pub fn set_speed(&mut self, movement: usize, speed: f64) -> Result<()> {
+        self.with(movement, |controller| controller.set_speed(speed))
+    }
+
+    /// Sets the limits of a movement, as [`Controller::set_limits`].
+    ///
+    /// ```
+    /// # use pdmp_core::motion::{Controllers, Limits};
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let mut controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 8], None)?;
+    /// controllers.set_limits(3, &Limits { velocity: Some(vec![2.0; 2]), ..Limits::default() })?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A movement that does not exist, or limits that [`Controller::set_limits`] rejects.
+    pub fn set_limits(&mut self, movement: usize, limits: &Limits) -> Result<()> {
+        self.with(movement, |controller| controller.set_limits(limits))
+    }
+
+    /// Discards the measured position of a movement, as [`Controller::release`].
+    ///
+    /// ```
+    /// # use pdmp_core::motion::Controllers;
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// # let mut controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 8], None)?;
+    /// controllers.release(3)?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A movement that does not exist.
+    pub fn release(&mut self, movement: usize) -> Result<()> {
+        self.with(movement, |controller| {
+            controller.release();
+            Ok(())
+        })
+    }
+
+    /// Changes the controller of a movement, whose state it then has.
+    fn with(&mut self, movement: usize, change: impl FnOnce(&mut Controller) -> Result<()>) -> Result<()> {
+        self.check_index(movement)?;
+        self.leave(movement);
+        let result = change(&mut self.controllers[movement]);
+        self.statuses[movement] = self.controllers[movement].status();
+        result
+    }
+
+    /// Makes a controller hold the state of its movement, if that was a steady one.
+    fn leave(&mut self, b: usize) {
+        if self.steady.holds(b) {
+            self.steady.write(b, &mut self.controllers[b]);
+            self.steady.release(b);
+        }
+    }
+
+    /// Advances the selected movements: the steady ones together, the others by `tick`.
+    fn advance(
+        &mut self,
+        mask: Option<&[bool]>,
+        motions: &mut Motions,
+        mut tick: impl FnMut(&mut Controller, usize) -> Result<Status>,
+    ) -> Result<()> {
+        let Motions { position, velocity, acceleration } = motions;
+        let mut rows = Rows { position: &mut **position, velocity: &mut **velocity, acceleration: &mut **acceleration };
+        self.ending.clear();
+        let first = &self.controllers[0];
+        self.steady.step(first.primitive(), first.steady_tick(), mask, &mut rows, &mut self.ending);
+        for i in 0..self.ending.len() {
+            self.leave(self.ending[i] as usize);
+        }
+        let (n_coordinates, n_dofs) = (self.primitive().n_coordinates(), self.primitive().n_dofs());
+        for b in 0..self.len() {
+            if self.steady.holds(b) || !is_selected(mask, b) {
+                continue;
+            }
+            let controller = &mut self.controllers[b];
+            self.statuses[b] = tick(controller, b)?;
+            controller.read(&mut Motion {
+                position: &mut rows.position[b * n_coordinates..][..n_coordinates],
+                velocity: &mut rows.velocity[b * n_dofs..][..n_dofs],
+                acceleration: &mut rows.acceleration[b * n_dofs..][..n_dofs],
+            });
+            self.steady.admit(b, controller);
+        }
+        Ok(())
+    }
+
+    /// Checks the lengths of a mask and of outputs.
+    fn check(&self, mask: Option<&[bool]>, motions: &Motions) -> Result<()> {
+        let (n, primitive) = (self.len(), self.primitive());
+        if let Some(mask) = mask {
+            check_length("mask", mask.len(), n, "movement")?;
+        }
+        let per_coordinate = "coordinate of each movement";
+        check_length("position", motions.position.len(), n * primitive.n_coordinates(), per_coordinate)?;
+        check_length("velocity", motions.velocity.len(), n * primitive.n_dofs(), "DoF of each movement")?;
+        check_length("acceleration", motions.acceleration.len(), n * primitive.n_dofs(), "DoF of each movement")
+    }
+
+    fn check_index(&self, b: usize) -> Result<()> {
+        check_range("movement", b as f64, b < self.len(), "must be less than the number of movements")
+    }
+}
+
+fn is_selected(mask: Option<&[bool]>, b: usize) -> bool {
+    mask.is_none_or(|mask| mask[b])
+}

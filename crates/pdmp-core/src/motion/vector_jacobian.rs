@@ -1,0 +1,353 @@
+//! Vector-Jacobian products of batches: gradients of a function of many movements by their conditions.
+//!
+//! For a function L of the movements with v⁽ᵏ⁾ = ∂L/∂y⁽ᵏ⁾ (T, D), and inner products ⟨·,·⟩ over time and orders k,
+//!
+//! ```text
+//! a_j[d] = ⟨v, Rⱼ⟩[d],  e[d] = ⟨v, E⟩[d],  n[d] = ⟨v, V⟩[d],  q[d] = ⟨v, G⟩[d],  c[d] = Σₜ v⁽⁰⁾[t, d]
+//! ∂L/∂sⱼ = r₀ Σ_d (a_j − e·Rⱼ(0) − n·Ṙⱼ(0))        ∂L/∂r₀ = Σⱼ sⱼ(∂L/∂sⱼ)/r₀
+//! ∂L/∂g = c − e      ∂L/∂y(0) = e      ∂L/∂ẏ(0) = n      ∂L/∂ẏ_g = q
+//! ∂L/∂τ = (−Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ − Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩ + n·ẏ(0) + q·ẏ_g)/τ
+//! ```
+//!
+//! with the unit responses of `unit_responses`. The loops are those of `superposition`, transposed: no Jacobian is formed.
+
+use std::ops::Range;
+
+use ndarray::{Array2, ArrayView3, ArrayViewMut1, ArrayViewMut2, Axis, aview1, s};
+
+use crate::error::{Error, Result};
+use crate::model::responses::Derivative;
+use crate::motion::batch::{BLOCK, Batch, MIN_MOVEMENTS_PER_BLOCK, PROGRESS_INTERVAL};
+use crate::motion::batch_conditions::PerMovement;
+use crate::motion::jacobian::WithRespectTo;
+use crate::motion::superposition::{Combination, Tile, tile_size};
+use crate::numerics::threads::Threads;
+use crate::validate::{row_major, zeros};
+
+/// Number of partial sums of an inner product, which fill vector registers.
+const LANES: usize = 4;
+
+impl Batch {
+    /// Computes the gradients of a function L of the movements of a range with respect to their conditions.
+    ///
+    /// `cotangents` are the derivatives ∂L/∂y, ∂L/∂ẏ and ∂L/∂ÿ of L by positions, velocities and accelerations, one to
+    /// three arrays (n, T, D); the orders left out do not enter L. The result has a matrix for each of `variables`: (n, J)
+    /// for the style, (n, 1) for amplitude and τ, else (n, D), row b being the gradient by the condition of movement b. A
+    /// condition that all movements share has the sum of the rows as its gradient. The gradients equal
+    /// Σ v·∂y/∂v with the Jacobians of [`crate::motion::jacobian`], to rounding.
+    ///
+    /// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
+    ///
+    /// ```
+    /// # use ndarray::{Axis, array};
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::model::Derivative;
+    /// # use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, WithRespectTo, batch};
+    /// # use pdmp_core::numerics::Threads;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let goals = PerMovement::Each(array![[1.0, 0.0], [1.2, 0.1]]);
+    /// let conditions = BatchConditions { goal: Some(goals), ..BatchConditions::default() };
+    /// let batch = batch(model.primitive(), conditions, TimeGrid { dt: 0.01, duration: None }, &mut |_| Ok(()))?;
+    /// let movements = batch.rollouts(0..2, Derivative::Position, Threads::ONE, &mut |_| Ok(()))?;
+    /// // L = ½ Σ y².
+    /// let cotangents = [movements.position.view()];
+    /// let variables = [WithRespectTo::Style, WithRespectTo::Goal];
+    /// let gradients = batch.vector_jacobian(0..2, &variables, &cotangents, Threads::ONE, &mut |_| Ok(()))?;
+    /// assert_eq!(gradients[0].dim(), (2, model.n_styles()));
+    /// assert_eq!(gradients[1].dim(), (2, 2));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A range beyond the batch; cotangents of another number or shape, or that are not finite; a variable of the other
+    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations; a primitive with
+    /// rotations; or the error of `progress`.
+    pub fn vector_jacobian(
+        &self,
+        movements: Range<usize>,
+        variables: &[WithRespectTo],
+        cotangents: &[ArrayView3<f64>],
+        threads: Threads,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Vec<Array2<f64>>> {
+        self.check_cotangents(&movements, variables, cotangents)?;
+        let (_, n_samples, n_dofs) = self.shape();
+        let columns = |variable: &WithRespectTo| match variable {
+            WithRespectTo::Style => self.n_styles(),
+            WithRespectTo::Amplitude | WithRespectTo::Tau => 1,
+            _ => n_dofs,
+        };
+        let new = |variable| zeros("gradients", (movements.len(), columns(variable)));
+        let mut gradients = variables.iter().map(new).collect::<Result<Vec<_>>>()?;
+        let by_tau = variables.contains(&WithRespectTo::Tau);
+        let time: Vec<f64> = match by_tau {
+            true => (0..n_samples).flat_map(|k| std::iter::repeat_n(k as f64 * self.dt, n_dofs)).collect(),
+            false => Vec::new(),
+        };
+        let work = Contraction { batch: self, time, by_tau };
+        let in_block = (BLOCK / (n_samples * n_dofs)).max(MIN_MOVEMENTS_PER_BLOCK);
+        let mut outputs: Vec<_> =
+            gradients.iter_mut().map(|rows| rows.axis_chunks_iter_mut(Axis(0), in_block)).collect();
+        let mut blocks = (0..movements.len())
+            .step_by(in_block)
+            .map(|first| (first, outputs.iter_mut().filter_map(Iterator::next).collect::<Vec<ArrayViewMut2<f64>>>()));
+        loop {
+            let next: Vec<_> = blocks.by_ref().take(PROGRESS_INTERVAL * threads.get()).collect();
+            let Some((first, _)) = next.first() else { break };
+            progress(*first as f64 / movements.len() as f64)?;
+            threads.try_for_each(next, |(first, mut outputs)| {
+                let at = first..(first + in_block).min(movements.len());
+                let cotangents: Vec<_> = cotangents.iter().map(|array| array.slice(s![at.clone(), .., ..])).collect();
+                for (i, product) in work.block(movements.start + first, &cotangents).iter().enumerate() {
+                    for (variable, output) in variables.iter().zip(&mut outputs) {
+                        self.write_gradient(movements.start + first + i, *variable, product, output.row_mut(i))?;
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        drop(blocks);
+        drop(outputs);
+        Ok(gradients)
+    }
+
+    /// Checks the arguments of [`Batch::vector_jacobian`], whose numbers are checked in the gradients.
+    fn check_cotangents(
+        &self,
+        movements: &Range<usize>,
+        variables: &[WithRespectTo],
+        cotangents: &[ArrayView3<f64>],
+    ) -> Result<()> {
+        let (n_movements, n_samples, n_dofs) = self.shape();
+        let wrong = |name, problem| Err(Error::Argument { name, problem });
+        if self.pose.is_some() {
+            return wrong("cotangents", "do not apply to a model with rotations: pass its Jacobians to your framework");
+        }
+        if movements.end > n_movements {
+            let value = movements.end as f64;
+            return Err(Error::Range { name: "movements", value, allowed: "exceeds the number of movements" });
+        }
+        let expected = (movements.len(), n_samples, n_dofs);
+        if !(1..=3).contains(&cotangents.len()) || cotangents.iter().any(|array| array.dim() != expected) {
+            return wrong("cotangents", "must be one to three arrays, each (movements, samples, DoFs) of the batch");
+        }
+        for variable in variables {
+            variable.check(self.kind, Derivative::ALL[cotangents.len() - 1])?;
+            let (name, given) = match variable {
+                WithRespectTo::Start => ("start", self.starts.is_some()),
+                WithRespectTo::Velocity => ("velocity", self.velocities.is_some()),
+                WithRespectTo::GoalVelocity => ("goal_velocity", self.goal_velocities.is_some()),
+                _ => continue,
+            };
+            if !given {
+                return wrong(name, "is not among the conditions: pass it to differentiate with respect to it");
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the gradient by one condition of movement `b`.
+    fn write_gradient(
+        &self,
+        b: usize,
+        variable: WithRespectTo,
+        product: &Product,
+        mut gradient: ArrayViewMut1<f64>,
+    ) -> Result<()> {
+        let Product { centre, start, velocity, goal_velocity, .. } = product;
+        let unit_style = |j: usize| {
+            let mut sum = product.styles[j];
+            for (given, derivative, products) in [
+                (self.starts.is_some(), Derivative::Position, start),
+                (self.velocities.is_some(), Derivative::Velocity, velocity),
+            ] {
+                if given {
+                    let at_start = self.responses.of(derivative).styles[j].row(0);
+                    sum -= at_start.iter().zip(products).fold(0.0, |sum, (r, product)| sum + r * product);
+                }
+            }
+            sum
+        };
+        let dot = |rows: &Option<PerMovement>, products: &[f64]| {
+            rows.as_ref().map_or(0.0, |rows| rows.row(b).iter().zip(products).fold(0.0, |sum, (v, p)| sum + v * p))
+        };
+        match variable {
+            WithRespectTo::Style => {
+                gradient.indexed_iter_mut().for_each(|(j, to)| *to = self.amplitude * unit_style(j))
+            }
+            WithRespectTo::Amplitude => {
+                gradient[0] = self.styles.row(b).indexed_iter().fold(0.0, |sum, (j, s)| sum + s * unit_style(j));
+            }
+            WithRespectTo::Goal | WithRespectTo::Anchor if self.starts.is_some() => {
+                gradient.indexed_iter_mut().for_each(|(d, to)| *to = centre[d] - start[d]);
+            }
+            WithRespectTo::Goal | WithRespectTo::Anchor => gradient.assign(&aview1(centre)),
+            WithRespectTo::Start => gradient.assign(&aview1(start)),
+            WithRespectTo::Velocity => gradient.assign(&aview1(velocity)),
+            WithRespectTo::GoalVelocity => gradient.assign(&aview1(goal_velocity)),
+            WithRespectTo::Tau => {
+                let given = dot(&self.velocities, velocity) + dot(&self.goal_velocities, goal_velocity);
+                gradient[0] = (given - product.scaled_time) / self.tau;
+            }
+        }
+        if gradient.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        let problem = "must be finite, and so small that the gradients do not overflow";
+        Err(Error::Argument { name: "cotangents", problem })
+    }
+}
+
+/// Inner products ⟨v, ·⟩ of the cotangents of one movement with the unit responses.
+#[derive(Clone, Debug)]
+struct Product {
+    /// Those with the styles (J,), summed over the DoFs.
+    styles: Vec<f64>,
+    /// c, e, n and q (D,); in sums over tiles, of each coefficient of a [`Combination`].
+    centre: Vec<f64>,
+    start: Vec<f64>,
+    velocity: Vec<f64>,
+    goal_velocity: Vec<f64>,
+    /// Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ + Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩, if τ is a variable.
+    scaled_time: f64,
+}
+
+impl Product {
+    fn zeros(n_styles: usize, n: usize) -> Self {
+        let [centre, start, velocity, goal_velocity] = [(); 4].map(|()| vec![0.0; n]);
+        Self { styles: vec![0.0; n_styles], centre, start, velocity, goal_velocity, scaled_time: 0.0 }
+    }
+
+    /// Returns ⟨v, y⟩ for the velocities or accelerations of a combination.
+    fn with(&self, combination: &Combination) -> f64 {
+        let Combination { style, start, velocity, goal_velocity, .. } = combination;
+        let last = goal_velocity.as_ref().map_or(0.0, |velocity| dot(&self.goal_velocity, velocity));
+        dot(&self.styles, style) + dot(&self.start, start) + dot(&self.velocity, velocity) + last
+    }
+
+    /// Adds the products of a tile with the cotangents `v`.
+    fn add(&mut self, tile: &Tile, v: &[f64], is_position: bool, has_velocity: bool) {
+        let period = self.start.len();
+        if is_position {
+            v.chunks(period).for_each(|v| self.centre.iter_mut().zip(v).for_each(|(sum, v)| *sum += v));
+        }
+        let goal_velocity = tile.goal_velocity.map(|responses| (&mut self.goal_velocity, responses));
+        let velocity = has_velocity.then_some((&mut self.velocity, tile.velocity));
+        for (sums, responses) in [Some((&mut self.start, tile.start)), velocity, goal_velocity].into_iter().flatten() {
+            for (v, responses) in v.chunks(period).zip(responses.chunks(period)) {
+                sums.iter_mut().zip(v).zip(responses).for_each(|((sum, v), response)| *sum += v * response);
+            }
+        }
+        for (sums, curves) in self.styles.chunks_mut(3).zip(tile.styles.chunks(3)) {
+            let products: [f64; 3] = match *curves {
+                [r, s, t] => dots([r, s, t], v),
+                [r, s] => {
+                    let [r, s] = dots([r, s], v);
+                    [r, s, 0.0]
+                }
+                _ => [dot(curves[0], v), 0.0, 0.0],
+            };
+            sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        }
+    }
+
+    /// Adds the products of another order.
+    fn add_all(&mut self, other: &Self) {
+        let Self { styles, centre, start, velocity, goal_velocity, scaled_time } = self;
+        let pairs = [
+            (styles, &other.styles),
+            (centre, &other.centre),
+            (start, &other.start),
+            (velocity, &other.velocity),
+            (goal_velocity, &other.goal_velocity),
+        ];
+        for (sums, products) in pairs {
+            sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        }
+        *scaled_time += other.scaled_time;
+    }
+
+    /// Returns the products of `n_dofs` DoFs, from those of their repeated coefficients.
+    fn folded(&self, n_dofs: usize) -> Self {
+        let fold = |sums: &Vec<f64>| (0..n_dofs).map(|d| sums[d..].iter().step_by(n_dofs).sum()).collect();
+        let Self { styles, centre, start, velocity, goal_velocity, scaled_time } = self;
+        let [centre, start, velocity, goal_velocity] = [centre, start, velocity, goal_velocity].map(fold);
+        Self { styles: styles.clone(), centre, start, velocity, goal_velocity, scaled_time: *scaled_time }
+    }
+}
+
+/// Returns inner products with the same vector.
+#[inline(always)]
+fn dots<const N: usize>(curves: [&[f64]; N], v: &[f64]) -> [f64; N] {
+    let mut sums = [[0.0; LANES]; N];
+    let whole = v.len() - v.len() % LANES;
+    let curves = curves.map(|curve| &curve[..v.len()]);
+    for at in (0..whole).step_by(LANES) {
+        for (sums, curve) in sums.iter_mut().zip(curves) {
+            for lane in 0..LANES {
+                sums[lane] += curve[at + lane] * v[at + lane];
+            }
+        }
+    }
+    std::array::from_fn(|j| (whole..v.len()).fold(sums[j].iter().sum(), |sum, i| sum + curves[j][i] * v[i]))
+}
+
+fn dot(curve: &[f64], v: &[f64]) -> f64 {
+    let [product] = dots([curve], v);
+    product
+}
+
+/// Settings of the products of all blocks.
+struct Contraction<'a> {
+    batch: &'a Batch,
+    /// Times (T·D,) of the elements of a movement, if τ is a variable.
+    time: Vec<f64>,
+    by_tau: bool,
+}
+
+impl Contraction<'_> {
+    /// Returns the products of consecutive movements from `first` on with their cotangents.
+    fn block(&self, first: usize, cotangents: &[ArrayView3<f64>]) -> Vec<Product> {
+        let batch = self.batch;
+        let (_, n_samples, n_dofs) = batch.shape();
+        let n_styles = batch.responses.of(Derivative::Position).styles.len();
+        let combinations: Vec<Combination> =
+            (first..first + cotangents[0].len_of(Axis(0))).map(|b| batch.combination(b)).collect();
+        let Some(period) = combinations.first().map(|combination| combination.centre.len()) else { return Vec::new() };
+        let (length, tile) = (n_samples * n_dofs, tile_size(period));
+        let has_velocity = batch.velocities.is_some();
+        let mut totals = vec![Product::zeros(n_styles, period); combinations.len()];
+        let (zeros, mut buffer) = (vec![0.0; period], vec![0.0; tile]);
+        for (order, cotangents) in Derivative::ALL.into_iter().zip(cotangents) {
+            let cotangents = cotangents.as_standard_layout();
+            let mut products = vec![Product::zeros(n_styles, period); combinations.len()];
+            for from in (0..length).step_by(tile) {
+                let at = from..(from + tile).min(length);
+                let part = Tile::new(batch.responses.of(order), at.clone());
+                let slope = Derivative::ALL.get(order as usize + 1).filter(|_| self.by_tau);
+                let slope = slope.map(|slope| Tile::new(batch.responses.of(*slope), at.clone()));
+                let movements = combinations.iter().zip(&mut products).zip(row_major(&cotangents).chunks(length));
+                for ((combination, product), v) in movements {
+                    let v = &v[at.clone()];
+                    product.add(&part, v, order == Derivative::Position, has_velocity);
+                    if let Some(slope) = &slope {
+                        let slopes = &mut buffer[..at.len()];
+                        slope.sum(combination, &zeros, slopes);
+                        slopes.iter_mut().zip(&self.time[at.clone()]).for_each(|(slope, time)| *slope *= time);
+                        product.scaled_time += dot(slopes, v);
+                    }
+                }
+            }
+            for ((total, mut product), combination) in totals.iter_mut().zip(products).zip(&combinations) {
+                if self.by_tau && order != Derivative::Position {
+                    product.scaled_time += product.with(combination) * f64::from(order as u8);
+                }
+                total.add_all(&product);
+            }
+        }
+        totals.iter().map(|total| total.folded(n_dofs)).collect()
+    }
+}

@@ -1,0 +1,210 @@
+//! Vector-Jacobian products of batches agree with Jacobians and with differences of rollouts.
+#![cfg(feature = "learning")]
+#![allow(missing_docs)]
+
+mod common;
+
+use std::sync::Arc;
+
+use common::*;
+use ndarray::{Array2, Array3, ArrayView3, Axis, s};
+use pdmp_core::model::Derivative;
+use pdmp_core::motion::{self, Batch, BatchConditions, PerMovement, TimeGrid, WithRespectTo, batch};
+use pdmp_core::numerics::Threads;
+use pdmp_core::{Conditions, Error, Kind, Model, rollout};
+use proptest::prelude::*;
+
+fn prepared(model: &Arc<Model>, conditions: &BatchConditions, grid: TimeGrid) -> Batch {
+    batch(model.primitive(), conditions.clone(), grid, &mut |_| Ok(())).unwrap()
+}
+
+fn gradients(batch: &Batch, variables: &[WithRespectTo], cotangents: &[Array3<f64>]) -> Vec<Array2<f64>> {
+    let cotangents: Vec<ArrayView3<f64>> = cotangents.iter().map(|array| array.view()).collect();
+    batch.vector_jacobian(0..batch.shape().0, variables, &cotangents, Threads::ONE, &mut |_| Ok(())).unwrap()
+}
+
+/// Numbers in [-1, 1] without a pattern.
+fn noise(shape: (usize, usize, usize), seed: u64) -> Array3<f64> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    Array3::from_shape_simple_fn(shape, || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    })
+}
+
+fn rows(rows: &Option<PerMovement>, b: usize) -> Option<Vec<f64>> {
+    rows.as_ref().map(|rows| match rows {
+        PerMovement::All(row) => row.clone(),
+        PerMovement::Each(rows) => rows.row(b).to_vec(),
+    })
+}
+
+fn condition(conditions: &BatchConditions, b: usize) -> Conditions {
+    Conditions {
+        style: rows(&conditions.style, b),
+        goal: rows(&conditions.goal, b),
+        anchor: rows(&conditions.anchor, b),
+        start: rows(&conditions.start, b),
+        velocity: rows(&conditions.velocity, b),
+        goal_velocity: rows(&conditions.goal_velocity, b),
+        amplitude: conditions.amplitude,
+        tau: conditions.tau,
+        ..Conditions::default()
+    }
+}
+
+/// Variables of a batch: those of its kind whose conditions it has.
+fn variables(kind: Kind, conditions: &BatchConditions, orders: usize) -> Vec<WithRespectTo> {
+    let discrete = kind == Kind::Discrete;
+    [
+        (WithRespectTo::Style, true),
+        (WithRespectTo::Goal, discrete),
+        (WithRespectTo::Anchor, !discrete),
+        (WithRespectTo::Start, discrete || conditions.start.is_some()),
+        (WithRespectTo::Velocity, conditions.velocity.is_some()),
+        (WithRespectTo::GoalVelocity, conditions.goal_velocity.is_some()),
+        (WithRespectTo::Amplitude, !discrete),
+        (WithRespectTo::Tau, orders < 3),
+    ]
+    .into_iter()
+    .filter_map(|(variable, present)| present.then_some(variable))
+    .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// The products are sums of cotangents times the Jacobians, whose columns are differences of rollouts, for every
+    /// variable and set of conditions, and do not depend on the division into ranges and threads.
+    #[test]
+    fn products_are_those_with_the_jacobians(
+        (start, velocity, goal_velocity) in (any::<bool>(), any::<bool>(), any::<bool>()),
+        amplitude in prop_oneof![Just(0.0), 0.1..3.0f64],
+        factor in 0.4..2.5f64,
+        (orders, samples, n, seed) in (1usize..4, 2usize..400, 1usize..5, any::<u64>()),
+    ) {
+        for model in [&*REACH, &*CYCLE] {
+            let (n_dofs, discrete) = (model.n_dofs(), model.kind() == Kind::Discrete);
+            let vectors = |columns: usize, seed| PerMovement::Each(noise((1, n, columns), seed).index_axis_move(Axis(0), 0));
+            let conditions = BatchConditions {
+                style: Some(vectors(2, seed)),
+                goal: discrete.then(|| vectors(n_dofs, seed + 1)),
+                anchor: (!discrete).then(|| vectors(n_dofs, seed + 1)),
+                start: start.then(|| vectors(n_dofs, seed + 2)),
+                velocity: velocity.then(|| vectors(n_dofs, seed + 3)),
+                goal_velocity: (discrete && goal_velocity).then(|| vectors(n_dofs, seed + 4)),
+                amplitude: (!discrete).then_some(amplitude),
+                tau: Some(factor * model.tau()),
+            };
+            let grid = grid(0.01, 0.01 * (samples - 1) as f64);
+            let variables = variables(model.kind(), &conditions, orders);
+            let prepared = prepared(model, &conditions, grid);
+            let cotangents: Vec<_> = (0..orders).map(|k| noise(prepared.shape(), seed + 9 + k as u64)).collect();
+            let found = gradients(&prepared, &variables, &cotangents);
+            for b in 0..n {
+                let one = condition(&conditions, b);
+                for (variable, found) in variables.iter().zip(&found) {
+                    let mut expected = vec![0.0; found.ncols()];
+                    let mut size = 1.0f64;
+                    for (order, cotangents) in Derivative::ALL.into_iter().zip(&cotangents) {
+                        let jacobian =
+                            motion::jacobian(model.primitive(), *variable, order, &one, grid, &mut |_| Ok(())).unwrap();
+                        for ((t, d, column), entry) in jacobian.indexed_iter() {
+                            expected[column] += entry * cotangents[[b, t, d]];
+                            size = size.max(entry.abs());
+                        }
+                    }
+                    for (found, expected) in found.row(b).iter().zip(&expected) {
+                        let error = (found - expected).abs();
+                        prop_assert!(error < 1e-12 * size * samples as f64, "{variable:?} {found} {expected}");
+                    }
+                }
+            }
+            let views: Vec<_> = cotangents.iter().map(|array| array.slice(s![n - 1.., .., ..])).collect();
+            let threads = Threads::new(3).unwrap();
+            let last = prepared.vector_jacobian(n - 1..n, &variables, &views, threads, &mut |_| Ok(())).unwrap();
+            for (last, all) in last.iter().zip(&found) {
+                prop_assert_eq!(last.row(0), all.row(n - 1));
+            }
+        }
+    }
+}
+
+/// The gradient by τ at fixed times is the central difference of rollouts, with velocities given and not, within the
+/// accuracy of the differences.
+#[test]
+fn gradient_by_tau_is_a_difference_of_rollouts() {
+    let mut compared = 0;
+    for model in [&*REACH, &*CYCLE] {
+        let (n, discrete) = (model.n_dofs(), model.kind() == Kind::Discrete);
+        for velocity in [None, Some(vec![0.7; n])] {
+            let goal_velocity = velocity.clone().filter(|_| discrete);
+            let conditions = Conditions {
+                style: Some(vec![0.2, -0.3]),
+                velocity,
+                goal_velocity,
+                tau: Some(1.3 * model.tau()),
+                ..Conditions::default()
+            };
+            let grid = grid(1e-3, 1.2 * model.duration());
+            let shared = BatchConditions::shared(model.primitive(), conditions.clone()).unwrap();
+            let prepared = prepared(model, &shared, grid);
+            let cotangents: Vec<_> = (0..2).map(|k| noise(prepared.shape(), 5 + k)).collect();
+            let found = gradients(&prepared, &[WithRespectTo::Tau], &cotangents)[0][[0, 0]];
+            let cost = |step: f64| {
+                let tau = conditions.tau.map(|tau| tau * (1.0 + step));
+                let moved = rollout(model.primitive(), &Conditions { tau, ..conditions.clone() }, grid).unwrap();
+                let dot = |v: &Array3<f64>, y: &Array2<f64>| (&v.index_axis(Axis(0), 0) * y).sum();
+                dot(&cotangents[0], &moved.position) + dot(&cotangents[1], &moved.velocity)
+            };
+            let step = 1e-5;
+            let expected = (cost(step) - cost(-step)) / (2.0 * step * 1.3 * model.tau());
+            assert!((found - expected).abs() < 1e-5 * expected.abs().max(1.0), "{found} {expected}");
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 4);
+}
+
+/// Cotangents of other layouts have the same gradients.
+#[test]
+fn cotangents_may_be_strided() {
+    let style = Some(PerMovement::Each(noise((1, 9, 2), 1).index_axis_move(Axis(0), 0)));
+    let prepared = prepared(&REACH, &BatchConditions { style, ..Default::default() }, grid(0.01, 1.0));
+    let cotangents = noise(prepared.shape(), 2);
+    let expected =
+        gradients(&prepared, &[WithRespectTo::Style, WithRespectTo::Goal], std::slice::from_ref(&cotangents));
+    let mut reversed = Array3::zeros((3, 101, 9));
+    reversed.assign(&cotangents.view().reversed_axes());
+    let found = gradients(&prepared, &[WithRespectTo::Style, WithRespectTo::Goal], &[reversed.reversed_axes()]);
+    assert_eq!(found, expected);
+}
+
+/// Errors name the argument.
+#[test]
+fn invalid_products_are_rejected() {
+    let prepared = prepared(&REACH, &BatchConditions::default(), grid(0.01, 1.0));
+    let valid = noise(prepared.shape(), 2);
+    let refused = |movements, variables: &[WithRespectTo], cotangents: &[&Array3<f64>]| {
+        let cotangents: Vec<_> = cotangents.iter().map(|array| array.view()).collect();
+        let result = prepared.vector_jacobian(movements, variables, &cotangents, Threads::ONE, &mut |_| Ok(()));
+        result.unwrap_err().argument().map(str::to_string)
+    };
+    let style = [WithRespectTo::Style];
+    let mut nan = valid.clone();
+    nan[[0, 50, 1]] = f64::NAN;
+    assert_eq!(refused(0..2, &style, &[&valid]).as_deref(), Some("movements"));
+    assert_eq!(refused(0..1, &style, &[]).as_deref(), Some("cotangents"));
+    assert_eq!(refused(0..1, &style, &[&noise((1, 101, 2), 1)]).as_deref(), Some("cotangents"));
+    assert_eq!(refused(0..1, &style, &[&nan]).as_deref(), Some("cotangents"));
+    assert_eq!(refused(0..1, &[WithRespectTo::Anchor], &[&valid]).as_deref(), Some("anchor"));
+    assert_eq!(refused(0..1, &[WithRespectTo::Amplitude], &[&valid]).as_deref(), Some("amplitude"));
+    assert_eq!(refused(0..1, &[WithRespectTo::Velocity], &[&valid]).as_deref(), Some("velocity"));
+    assert_eq!(refused(0..1, &[WithRespectTo::GoalVelocity], &[&valid]).as_deref(), Some("goal_velocity"));
+    assert_eq!(refused(0..1, &[WithRespectTo::Tau], &[&valid, &valid, &valid]).as_deref(), Some("tau"));
+    let cancelled =
+        prepared.vector_jacobian(0..1, &style, &[valid.view()], Threads::ONE, &mut |_| Err(Error::Interrupted));
+    assert!(matches!(cancelled, Err(Error::Interrupted)));
+}

@@ -1,0 +1,180 @@
+"""Gradients through movements: vector-Jacobian products, and their wrappers for torch and jax."""
+
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pdmp
+
+RNG = np.random.default_rng(0)
+STYLES = RNG.normal(size=(7, 2))
+
+
+def centre_of(model: pdmp.Model) -> str:
+    """Returns the name of the argument that moves a batch as a whole."""
+    return "goal" if model.kind == "discrete" else "anchor"
+
+
+def cost(movements: tuple[Any, ...]) -> Any:
+    """Returns a loss that is not linear in positions and velocities."""
+    positions, velocities = movements
+    return (positions**2 * (1 + positions)).sum() + 0.1 * (velocities**2).sum()
+
+
+def cotangents(movements: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Returns the derivatives of `cost`."""
+    positions, velocities = movements
+    return 2 * positions + 3 * positions**2, 0.2 * velocities
+
+
+def difference(model: pdmp.Model, given: dict[str, Any], name: str, options: Any) -> Any:
+    """Returns the central differences of `cost` by the elements of one condition."""
+    value = np.asarray(given[name], dtype=float)
+    found = np.zeros(value.shape)
+    for index in np.ndindex(value.shape):
+        step = np.zeros(value.shape)
+        step[index] = 1e-5
+        ahead, behind = (
+            cost(model.rollouts(**{**given, name: value + sign * step}, **options))
+            for sign in (1, -1)
+        )
+        found[index] = (ahead - behind) / 2e-5
+    return found
+
+
+def given_for(model: pdmp.Model) -> dict[str, Any]:
+    """Returns conditions of a batch, of which the start is shared."""
+    given: dict[str, Any] = {
+        "style": STYLES,
+        centre_of(model): RNG.normal(size=(7, 2)),
+        "start": RNG.normal(size=2),
+        "velocity": RNG.normal(size=(7, 2)),
+        "tau": 1.2 * model.tau,
+    }
+    if model.kind == "discrete":
+        return {**given, "goal_velocity": RNG.normal(size=(7, 2))}
+    return {**given, "amplitude": 0.7}
+
+
+def test_gradients_are_differences_of_costs(model: pdmp.Model) -> None:
+    """The products are the gradients of a cost of positions and velocities by every condition."""
+    given, options = given_for(model), {"dt": 0.002, "duration": 1.3}
+    wrt: Any = list(given)
+    movements = model.rollouts(**given, **options)
+    found = model.rollouts_vjp(wrt, cotangents(movements), **given, **options)
+    for name, gradient in zip(wrt, found, strict=True):
+        expected = difference(model, given, name, options)
+        total = gradient if np.ndim(given[name]) == gradient.ndim else gradient.sum(axis=0)
+        assert total.shape == expected.shape
+        np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())
+
+
+def test_products_are_those_with_jacobians(model: pdmp.Model) -> None:
+    """The gradients of one movement equal the contraction of cotangents with its Jacobians."""
+    given = {name: np.atleast_2d(v)[0] for name, v in given_for(model).items() if name != "tau"}
+    if "amplitude" in given:
+        given["amplitude"] = 0.7
+    for derivative in range(3):
+        arrays = [np.zeros((1, 101, 2)) for _ in range(derivative + 1)]
+        arrays[-1] = RNG.normal(size=(1, 101, 2))
+        wrt: Any = [*given, *(["tau"] if derivative < 2 else [])]
+        found = model.rollouts_vjp(wrt, tuple(arrays), duration=1.0, **given)
+        for name, gradient in zip(wrt, found, strict=True):
+            jacobian = model.jacobian(name, derivative=derivative, duration=1.0, **given)
+            expected = np.einsum("tdj,td->j", jacobian, arrays[-1][0])
+            np.testing.assert_allclose(gradient.ravel(), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_positions_alone_and_one_name(reach: pdmp.Model) -> None:
+    """One array of cotangents and one name need no tuple; threads leave the result unchanged."""
+    array = RNG.normal(size=(7, 101, 2))
+    (alone,) = reach.rollouts_vjp("style", array, style=STYLES, duration=1.0)
+    several = reach.rollouts_vjp(["style"], (array,), style=STYLES, duration=1.0, threads=1)
+    np.testing.assert_array_equal(alone, several[0])
+    assert alone.shape == (7, 2)
+
+
+@pytest.mark.parametrize(
+    ("wrt", "shape", "message"),
+    [
+        ("style", (7, 101), r"cotangents has shape \[7, 101\]"),
+        ("style", (7, 100, 2), "cotangents must be one to three arrays"),
+        ("mass", (7, 101, 2), "wrt = 'mass': must be \"style\""),
+        ("anchor", (7, 101, 2), "anchor does not apply"),
+        ("velocity", (7, 101, 2), "velocity is not among the conditions"),
+    ],
+)
+def test_errors_name_the_argument(
+    reach: pdmp.Model, wrt: Any, shape: tuple[int, ...], message: str
+) -> None:
+    """Wrong arguments of a product are named."""
+    with pytest.raises(ValueError, match=message):
+        reach.rollouts_vjp(wrt, np.zeros(shape), style=STYLES, duration=1.0)
+
+
+def test_autodiff_imports_no_framework() -> None:
+    """The module imports neither torch nor jax."""
+    code = "import sys, pdmp.autodiff; assert not {'torch', 'jax'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_jax_differentiates_through_movements(model: pdmp.Model) -> None:
+    """Gradients by jax are those of rollouts, also compiled, and of shared conditions."""
+    jax = pytest.importorskip("jax")
+    with jax.enable_x64(True):
+        given, options = given_for(model), {"dt": 0.002, "duration": 1.3}
+        move = pdmp.autodiff.jax_rollouts(model, derivatives=1, **options)
+
+        def loss(given: dict[str, Any]) -> Any:
+            return cost(move(**given))
+
+        for gradient in (jax.grad(loss), jax.jit(jax.grad(loss))):
+            found = gradient({n: jax.numpy.asarray(v, dtype=float) for n, v in given.items()})
+            for name in given:
+                expected = difference(model, given, name, options)
+                assert found[name].shape == expected.shape
+                scale = abs(expected).max()
+                np.testing.assert_allclose(found[name], expected, rtol=1e-5, atol=1e-6 * scale)
+        for made, expected in zip(move(**given), model.rollouts(**given, **options), strict=True):
+            np.testing.assert_array_equal(made, expected)
+        mapped = jax.vmap(lambda style: move(style=style)[0][0])(STYLES)
+        np.testing.assert_array_equal(mapped, model.rollouts(style=STYLES, **options)[0])
+
+
+def test_jax_keeps_single_precision(reach: pdmp.Model) -> None:
+    """Conditions in single precision have movements and gradients in it."""
+    jax = pytest.importorskip("jax")
+    move = pdmp.autodiff.jax_rollouts(reach, dt=0.01)
+    style = jax.numpy.asarray(STYLES, dtype="float32")
+    (positions,) = move(style=style)
+    gradient = jax.grad(lambda style: move(style=style)[0].sum())(style)
+    assert positions.dtype == gradient.dtype == "float32"
+
+
+def test_torch_differentiates_through_movements(model: pdmp.Model) -> None:
+    """Gradients by torch are those of rollouts, of shared conditions too."""
+    torch = pytest.importorskip("torch")
+    given, options = given_for(model), {"dt": 0.002, "duration": 1.3}
+    move = pdmp.autodiff.torch_rollouts(model, derivatives=1, **options)
+    tensors = {
+        name: torch.tensor(value, dtype=torch.float64, requires_grad=True)
+        for name, value in given.items()
+    }
+    cost(move(**tensors)).backward()
+    for name, tensor in tensors.items():
+        expected = difference(model, given, name, options)
+        scale = abs(expected).max()
+        np.testing.assert_allclose(tensor.grad, expected, rtol=1e-5, atol=1e-6 * scale)
+
+
+def test_torch_keeps_types(reach: pdmp.Model) -> None:
+    """Conditions without gradients get none, and single precision is kept."""
+    torch = pytest.importorskip("torch")
+    move = pdmp.autodiff.torch_rollouts(reach)
+    style = torch.tensor(STYLES, dtype=torch.float32, requires_grad=True)
+    (positions,) = move(style=style, goal=torch.ones(2))
+    positions.sum().backward()
+    assert positions.dtype == style.grad.dtype == torch.float32
