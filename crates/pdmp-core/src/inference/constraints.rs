@@ -30,6 +30,9 @@ pub(super) struct Request<'a> {
     pub(super) parameters: Vec<f64>,
 }
 
+/// A DoF with its position and velocity at a point.
+type OfDof = (usize, Option<f64>, Option<f64>);
+
 impl Request<'_> {
     /// Returns the constraints of points.
     ///
@@ -82,7 +85,7 @@ impl Request<'_> {
     }
 
     /// Returns DoF, position and velocity of each constraint on a DoF.
-    fn of_dofs(&self, point: &ViaPoint, given: &[usize], v: f64) -> Result<Vec<(usize, Option<f64>, Option<f64>)>> {
+    fn of_dofs(&self, point: &ViaPoint, given: &[usize], v: f64) -> Result<Vec<OfDof>> {
         let at = |vector: &Option<Vec<f64>>, i: usize| vector.as_ref().map(|vector| vector[i]);
         let Some(coordinates) = self.primitive.coordinates() else {
             return Ok(given
