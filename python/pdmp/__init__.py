@@ -17,10 +17,12 @@ from pdmp import io, plot, preprocessing
 from pdmp._limits import Limits
 from pdmp._native import (
     GP,
+    BlockStyles,
     Conditions,
     ContextMap,
     Controller,
     Demonstration,
+    FactorisedFit,
     Factors,
     FitError,
     GPRegression,
@@ -29,10 +31,12 @@ from pdmp._native import (
     ModelFileError,
     NGnet,
     NGnetRegression,
+    PartialFit,
     PdmpError,
     Prediction,
     RolloutChunks,
     Status,
+    StyleProjection,
     TimeWarp,
     Trajectory,
     __version__,
@@ -45,6 +49,7 @@ from pdmp.realtime import PacedLoop, Tick
 
 if _TYPE_CHECKING:
     from pdmp import datasets, evaluation, robots
+    from pdmp._distributed import fit_distributed
     from pdmp.evaluation import evaluate
 else:
 
@@ -52,6 +57,8 @@ else:
         """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
             return _import_module("pdmp.evaluation").evaluate
+        if name == "fit_distributed":
+            return _import_module("pdmp._distributed").fit_distributed
         if name in ("datasets", "evaluation", "robots"):
             return _import_module(f"pdmp.{name}")
         raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
@@ -63,10 +70,12 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "GP",
+    "BlockStyles",
     "Conditions",
     "ContextMap",
     "Controller",
     "Demonstration",
+    "FactorisedFit",
     "Factors",
     "FitError",
     "GPRegression",
@@ -77,10 +86,12 @@ __all__ = [
     "NGnet",
     "NGnetRegression",
     "PacedLoop",
+    "PartialFit",
     "PdmpError",
     "Prediction",
     "RolloutChunks",
     "Status",
+    "StyleProjection",
     "Tick",
     "TimeWarp",
     "Trajectory",
@@ -91,6 +102,7 @@ __all__ = [
     "evaluation",
     "factorise",
     "fit",
+    "fit_distributed",
     "io",
     "load",
     "plot",
