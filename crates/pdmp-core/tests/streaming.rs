@@ -40,6 +40,12 @@ fn recordings(kind: Kind, noise: f64, seed: u64) -> Vec<Demonstration> {
     (0..N_DEMOS).map(demo).collect()
 }
 
+fn with_samples(options: &FitOptions, n_samples: usize) -> FitOptions {
+    let mut options = options.clone();
+    options.n_samples = Some(n_samples);
+    options
+}
+
 fn streamed(demos: &[Demonstration], size: usize, options: &FitOptions) -> (Model, usize) {
     let mut passes = 0;
     let mut blocks = || -> Blocks<'_> {
@@ -112,7 +118,7 @@ fn blocks_give_the_model_of_all_demonstrations() {
     let (discrete, rhythmic) = (FitOptions::discrete(), FitOptions::rhythmic());
     let cases: [(&str, Vec<Demonstration>, FitOptions, usize); 9] = [
         ("plain", recordings(Kind::Discrete, 0.0, 1), discrete.clone(), 3),
-        ("given", recordings(Kind::Discrete, 0.0, 2), FitOptions { n_samples: Some(160), ..discrete.clone() }, 2),
+        ("given", recordings(Kind::Discrete, 0.0, 2), with_samples(&discrete, 160), 2),
         ("noise", recordings(Kind::Discrete, 0.02, 3), discrete.clone(), 3),
         ("units", with_units(recordings(Kind::Discrete, 0.02, 4)), discrete.clone(), 4),
         ("range", recordings(Kind::Discrete, 0.0, 5), discrete.clone().dof_scale(DofScaling::Range), 4),
@@ -126,7 +132,7 @@ fn blocks_give_the_model_of_all_demonstrations() {
                 let transport = pdmp_core::learning::TransportSelection::Immediate;
                 let canonical =
                     pdmp_core::learning::CanonicalOptions::Discrete { tau: Some(0.7), alpha_x: None, transport };
-                FitOptions { canonical, ..discrete.clone() }
+                FitOptions::new(canonical)
             },
             3,
         ),
@@ -177,7 +183,7 @@ fn merging_is_associative() {
         assert_eq!(partial.n_demos(), N_DEMOS);
         finished(partial.factorise(&options, &mut |_, _| Ok(())).unwrap())
     });
-    let whole = fit(&demos, &FitOptions { n_samples: Some(empty.n_samples()), ..options }).unwrap();
+    let whole = fit(&demos, &with_samples(&options, empty.n_samples())).unwrap();
     for model in models {
         assert_eq!(model.n_styles(), whole.n_styles());
         assert!(difference(&model.demonstrated().styles, &whole.demonstrated().styles) < 1e-10);
@@ -203,7 +209,7 @@ fn bytes_keep_every_part() {
         BlockStyles::from_bytes(&styles.to_bytes().unwrap()).unwrap()
     });
     let model = factorised.finish(styles.to_vec(), &mut |_, _| Ok(())).unwrap();
-    let whole = fit(&demos, &FitOptions { n_samples: Some(partial.n_samples()), ..options }).unwrap();
+    let whole = fit(&demos, &with_samples(&options, partial.n_samples())).unwrap();
     assert_equal(&model, &whole, "bytes");
     let bytes = partial.to_bytes().unwrap();
     assert!(StyleProjection::from_bytes(&bytes).is_err() && Model::from_bytes(&bytes).is_err());
@@ -242,9 +248,9 @@ fn unsuitable_arguments_are_named() {
     assert_eq!(named(partial.update(&[demos[20].clone(), narrow]).unwrap_err()), "position");
     assert_eq!(named(partial.update(&[demos[20].clone(), plain]).unwrap_err()), "context");
     assert_eq!(partial.n_demos(), 20);
-    let other = PartialFit::new(&demos, &FitOptions { n_samples: Some(100), ..options.clone() }).unwrap();
+    let other = PartialFit::new(&demos, &with_samples(&options, 100)).unwrap();
     assert_eq!(named(partial.merge(&other).unwrap_err()), "other");
-    let validated = FitOptions { n_styles: NStyles::CrossValidated, ..options.clone() };
+    let validated = options.clone().n_styles(NStyles::CrossValidated);
     assert_eq!(named(partial.factorise(&validated, &mut |_, _| Ok(())).err().unwrap()), "n_styles");
     let factorised = partial.factorise(&options, &mut |_, _| Ok(())).unwrap();
     let others = factorised.styles(&demos[1..21], 0).unwrap();

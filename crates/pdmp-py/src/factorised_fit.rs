@@ -112,7 +112,17 @@ impl StyleProjection {
         bytes(py, self.0.to_bytes())
     }
 
-    /// Reads a projection from the result of `to_bytes`.
+    /// Reads a projection from bytes.
+    ///
+    /// Parameters
+    /// ----------
+    /// data : bytes
+    ///     Result of `to_bytes`.
+    ///
+    /// Raises
+    /// ------
+    /// ModelFileError
+    ///     The data are damaged, of another type or of another version.
     #[staticmethod]
     fn from_bytes(data: &[u8]) -> PyResult<Self> {
         pdmp_core::learning::StyleProjection::from_bytes(data).map(Self).map_err(raise)
@@ -140,7 +150,17 @@ impl BlockStyles {
         bytes(py, self.0.to_bytes())
     }
 
-    /// Reads styles from the result of `to_bytes`.
+    /// Reads styles from bytes.
+    ///
+    /// Parameters
+    /// ----------
+    /// data : bytes
+    ///     Result of `to_bytes`.
+    ///
+    /// Raises
+    /// ------
+    /// ModelFileError
+    ///     The data are damaged, of another type or of another version.
     #[staticmethod]
     fn from_bytes(data: &[u8]) -> PyResult<Self> {
         pdmp_core::learning::BlockStyles::from_bytes(data).map(Self).map_err(raise)

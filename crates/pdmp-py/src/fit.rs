@@ -3,11 +3,10 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
-use ndarray::Array2;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::regression::Basis;
 use pdmp_core::learning::{
-    CanonicalOptions, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_blocks, fit_with,
+    CanonicalOptions, DofScaling, NStyles, Stage, TransportSelection, Truncation, fit_blocks, fit_with,
 };
 use pdmp_core::model::Frame;
 use pdmp_core::numerics::Smoothing;
@@ -18,7 +17,7 @@ use pyo3::types::{PyBool, PyList, PyMapping, PyString};
 
 use crate::blocks::Blocks;
 use crate::choice::Choice;
-use crate::convert::{items, matrix, numbers, quoted};
+use crate::convert::{items, numbers, quoted};
 use crate::demonstration::{Demonstration, Source};
 use crate::error::{detached, raise};
 use crate::instance;
@@ -26,7 +25,7 @@ use crate::model::Model;
 use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
 use crate::trajectory::Trajectory;
-use crate::warp::TimeWarp;
+use crate::warp::time_scaling_of;
 
 /// Fits a movement primitive to demonstrations.
 ///
@@ -342,34 +341,6 @@ pub(crate) fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
         _ => {
             let allowed = "must be \"gp\", \"ngnet\", pdmp.GP(...) or pdmp.NGnet(...)";
             Err(PyValueError::new_err(format!("basis = {}: {allowed}", quoted(basis))))
-        }
-    }
-}
-
-fn time_scaling_of(
-    alignment: Option<&Bound<'_, PyAny>>,
-    landmarks: Option<&Bound<'_, PyAny>>,
-) -> PyResult<TimeScaling> {
-    let alignment = alignment.map_or(Ok(TimeScaling::Linear), alignment_of)?;
-    let landmarks: Option<Array2<f64>> =
-        landmarks.map(|landmarks| matrix("landmarks", "(M, E)", landmarks)).transpose()?;
-    match (alignment, landmarks) {
-        (TimeScaling::Linear, Some(landmarks)) => Ok(TimeScaling::Landmarks(landmarks)),
-        (_, Some(_)) => Err(PyValueError::new_err("alignment and landmarks: pass a warp or landmarks, not both")),
-        (alignment, None) => Ok(alignment),
-    }
-}
-
-fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
-    if let Ok(warp) = alignment.cast::<TimeWarp>() {
-        return Ok(TimeScaling::Warp(warp.get().0.clone()));
-    }
-    match alignment.extract::<String>().as_deref() {
-        Ok("linear") => Ok(TimeScaling::Linear),
-        Ok("warp") => Ok(TimeScaling::WarpIfBetter),
-        _ => {
-            let allowed = "must be \"linear\", \"warp\" or pdmp.TimeWarp(...)";
-            Err(PyValueError::new_err(format!("alignment = {}: {allowed}", quoted(alignment))))
         }
     }
 }

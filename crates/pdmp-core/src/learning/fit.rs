@@ -16,17 +16,15 @@ use crate::learning::options::TransportSelection;
 use crate::learning::style_selection::cross_validation::StyleSelection;
 use crate::learning::targets::Targets;
 use crate::model::primitive::Primitive;
-use crate::model::responses::Derivative;
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
-use crate::motion::unit_responses::phases;
 use crate::preprocessing::inspection::{cycle_ends, inspect, unwound};
 use crate::validate::{check_length, check_names};
 
 use super::assembly::Foundation;
 use super::braking_rate::share_accelerations;
 use super::constants::Constants;
-use super::movement_metric::{metric, residual_variance, squared_residuals};
+use super::movement_metric::{metric, phase_curves, residual_variance, squared_residuals};
 use super::noise_findings;
 use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
 use super::rotation_timing;
@@ -179,10 +177,9 @@ pub fn fit_with(
     let noise = aligned.noise.clone();
     let learn = |columns| {
         let map = learn_map(columns, &primitive, &demonstrated, options)?;
-        let (kind, outputs, responses) =
-            (primitive.kind(), demonstrated.outputs(primitive.kind()), phases(&primitive)?);
-        let curves = responses.of(Derivative::Position);
-        let squares = squared_residuals(kind, curves, outputs.view(), aligned);
+        let outputs = demonstrated.outputs(primitive.kind());
+        let curves = phase_curves(&primitive)?;
+        let squares = squared_residuals(primitive.kind(), &curves, outputs.view(), aligned);
         Ok::<_, Error>((map, residual_variance(squares, outputs.nrows(), &noise)))
     };
     let (map, residual_variance) = columns.map(learn).transpose()?.unzip();

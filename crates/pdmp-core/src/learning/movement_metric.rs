@@ -24,9 +24,14 @@ pub(super) fn metric(
     Ok(sensitivity.metric(outputs, segment_durations))
 }
 
+/// Returns the responses of a primitive over the demonstrated duration in [`STEPS`] steps.
+pub(super) fn phase_curves(primitive: &Arc<Primitive>) -> Result<Curves> {
+    Ok(phases(primitive)?.of(Derivative::Position).clone())
+}
+
 /// Returns the sum over the demonstrations of the squared residuals (S, D) over the phase.
 ///
-/// `curves` are the responses of the primitive over the demonstrated duration in [`STEPS`] steps.
+/// `curves` are those of [`phase_curves`].
 pub(super) fn squared_residuals(
     kind: Kind,
     curves: &Curves,

@@ -99,7 +99,7 @@ impl Targets {
     /// Returns the sums for the transport profile of these movements, with DoFs in the given units (D,).
     pub(crate) fn profile_sums(&self, unit: &[f64]) -> ProfileSums {
         let unit = aview1(unit);
-        ProfileSums::of((&self.displacements / &unit).view(), (&self.goals - &self.starts) / &unit)
+        ProfileSums::of((&self.displacements / &unit).view(), (&self.goals - &self.starts) / unit)
     }
 
     /// Returns the largest |y″| of each DoF with respect to the clock (D,).

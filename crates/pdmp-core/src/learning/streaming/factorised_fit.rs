@@ -11,15 +11,13 @@ use crate::learning::assembly::Foundation;
 use crate::learning::constants::Constants;
 use crate::learning::factorization::{Factors, orthonormal_styles};
 use crate::learning::fit::{Contexts, learn_map};
-use crate::learning::movement_metric::residual_variance;
+use crate::learning::movement_metric::{phase_curves, residual_variance};
 use crate::learning::noise_findings;
 use crate::learning::options::{CanonicalOptions, FitOptions, NStyles, Stage, TransportSelection};
 use crate::learning::stiffness::stiffness;
 use crate::learning::style_selection::singular_values::{Recorded, noise_limit, squares_are_regressors, systematic};
 use crate::learning::targets::lag_target;
-use crate::model::responses::Derivative;
 use crate::model::{DemonstrationParameters, Finding, FitSummary, Model};
-use crate::motion::unit_responses::phases;
 use crate::numerics::orthonormal_span::OrthonormalSpan;
 
 /// Factorised targets of a [`PartialFit`], which await the styles of its demonstrations.
@@ -213,7 +211,7 @@ impl FactorisedFit {
         let foundation = self.foundation.clone();
         let (table, _) = foundation.forcing_table(&self.factors.basis_targets, &self.options, progress)?;
         let primitive = foundation.primitive(table, &demonstrated);
-        self.projection.curves = Some(phases(&primitive)?.of(Derivative::Position).clone());
+        self.projection.curves = Some(phase_curves(&primitive)?);
         Ok(())
     }
 
