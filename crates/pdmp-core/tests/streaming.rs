@@ -72,26 +72,38 @@ fn assert_equal(streamed: &Model, whole: &Model, what: &str) {
     assert_eq!(streamed.learnt().dof_scale, whole.learnt().dof_scale, "{what}");
     assert_eq!(streamed.learnt().findings, whole.learnt().findings, "{what}");
     assert_eq!(streamed.ranges(), whole.ranges(), "{what}");
-    assert!(difference(&a.styles, &b.styles) < 1e-10, "{what}: {:e}", difference(&a.styles, &b.styles));
+    // The error of a singular vector is the residual, at most 1e-11·σ₁, over the gap to the next singular value.
+    let sigma = &streamed.learnt().singular_values;
+    for (j, (own, other)) in a.styles.columns().into_iter().zip(b.styles.columns()).enumerate() {
+        let gap = |k: usize| sigma.get(k).zip(sigma.get(k + 1)).map_or(sigma[j], |(this, next)| this - next);
+        let gap = if j > 0 { gap(j).min(gap(j - 1)) } else { gap(j) };
+        let (error, bound) = (difference(&own, &other), 1e-10 + 1e-10 * sigma[0] / gap);
+        assert!(error < bound, "{what}: style {j} {error:e} {bound:e}");
+    }
     let [own, other] = [streamed, whole].map(|model| &model.learnt().singular_values[..model.n_styles()]);
     let [own, other] = [own, other].map(|values| ndarray::Array1::from(values.to_vec()));
     assert!(difference(&own, &other) < 1e-10, "{what}");
-    assert!((streamed.learnt().truncation_error - whole.learnt().truncation_error).abs() < 1e-10, "{what}");
+    // `Factors::error` is an upper bound, up to 1e-6·‖F‖ above the error.
+    assert!((streamed.learnt().truncation_error - whole.learnt().truncation_error).abs() < 1e-6, "{what}");
     let grid = TimeGrid { dt: 0.01, duration: None };
     for m in [0, 17, N_DEMOS - 1] {
         let [own, other] =
             [streamed, whole].map(|model| rollout(model.primitive(), &model.conditions(&[m]).unwrap(), grid).unwrap());
-        for (own, other) in [
-            (&own.position, &other.position),
-            (&own.velocity, &other.velocity),
-            (&own.acceleration, &other.acceleration),
+        // The search for the hyperparameters of the landscape ends elsewhere by rounding, which changes the movement between
+        // samples.
+        for (own, other, tolerance) in [
+            (&own.position, &other.position, 1e-9),
+            (&own.velocity, &other.velocity, 1e-6),
+            (&own.acceleration, &other.acceleration, 1e-4),
         ] {
-            assert!(difference(own, other) < 1e-9, "{what}: {:e}", difference(own, other));
+            assert!(difference(own, other) < tolerance, "{what}: {:e} {tolerance:e}", difference(own, other));
         }
     }
     match (&streamed.learnt().residual_variance, &whole.learnt().residual_variance) {
         (Some(own), Some(other)) => {
-            assert!(difference(own, other) < 1e-9, "{what}: {:e}", difference(own, other));
+            for ((_, d), change) in (own - other).indexed_iter() {
+                assert!(change.abs() < 1e-9 * whole.ranges()[d].powi(2), "{what}: {change:e}");
+            }
             let [own, other] = [streamed, whole].map(|model| model.predict(&[0.3, -0.2]).unwrap());
             let position = |conditions: &Conditions| {
                 rollout(whole.primitive(), conditions, TimeGrid { dt: 0.01, duration: Some(1.5) }).unwrap().position
