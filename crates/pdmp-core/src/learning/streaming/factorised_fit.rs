@@ -199,7 +199,7 @@ impl FactorisedFit {
         self.summaries.len()
     }
 
-    /// Returns what the second pass needs to know.
+    /// Returns the projection of blocks to their styles, for the second pass.
     pub fn projection(&self) -> &StyleProjection {
         &self.projection
     }

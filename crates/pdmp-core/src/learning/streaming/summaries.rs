@@ -122,7 +122,7 @@ impl Summaries {
         Some((columns, numbers))
     }
 
-    /// Returns the rows from `first` on of vectors (M, D), as many as `rows` has, that differ from `rows`.
+    /// Returns the first of `rows` that is not the start of the demonstration of its index, counted from `first`.
     pub(super) fn differ(&self, first: usize, rows: ArrayView2<f64>) -> Option<usize> {
         let own = |m: usize| self.starts.get((first + m) * self.n_dofs..(first + m + 1) * self.n_dofs);
         rows.axis_iter(Axis(0)).enumerate().position(|(m, row)| own(m).is_none_or(|own| row != ndarray::aview1(own)))
