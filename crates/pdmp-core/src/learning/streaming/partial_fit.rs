@@ -19,7 +19,7 @@ use crate::validate::zeros;
 /// Largest number of findings that are kept.
 const MAX_FINDINGS: usize = 100;
 
-/// All that a fit needs of the demonstrations so far, in bounded memory: a triangular factor R (N, N) of their
+/// Summary of the demonstrations so far from which a fit follows, in bounded memory: a triangular factor R (N, N) of their
 /// targets F (M, C·D), N = C·D + D + 1 and a few numbers for each context value, and O(D) numbers of each demonstration.
 ///
 /// RᵀR = FᵀF, so that R has the singular values and F_basis of F. Partial fits of parts are merged in any tree; the result
