@@ -971,7 +971,18 @@ class StyleProjection:
         """Returns the projection as bytes."""
     @staticmethod
     def from_bytes(data: bytes) -> StyleProjection:
-        """Reads a projection from the result of `to_bytes`."""
+        """Reads a projection from bytes.
+
+        Parameters
+        ----------
+        data : bytes
+            Result of `to_bytes`.
+
+        Raises
+        ------
+        ModelFileError
+            The data are damaged, of another type or of another version.
+        """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
@@ -984,7 +995,18 @@ class BlockStyles:
         """Returns the styles as bytes."""
     @staticmethod
     def from_bytes(data: bytes) -> BlockStyles:
-        """Reads styles from the result of `to_bytes`."""
+        """Reads styles from bytes.
+
+        Parameters
+        ----------
+        data : bytes
+            Result of `to_bytes`.
+
+        Raises
+        ------
+        ModelFileError
+            The data are damaged, of another type or of another version.
+        """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
