@@ -33,7 +33,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-controllers bench-scaling bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install packages header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-controllers bench-scaling bench-streaming bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install packages header stubs \
 	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -73,6 +73,9 @@ bench-controllers: .venv/with-demo  ## A tick of 4096 movements in Python: toget
 
 bench-scaling: .venv/with-peers  ## Draws how the time to learn grows with the data, into docs/scaling.png
 	OMP_NUM_THREADS=1 $(BIN)/python benches/scaling.py
+
+bench-streaming: .venv/with-peers  ## Fits of a thousand to a hundred thousand demonstrations in blocks, and their memory
+	OMP_NUM_THREADS=1 $(BIN)/python benches/streaming.py
 
 bench-bases: .venv/with-demo  ## How well each basis reproduces and predicts the recordings in PDMP_DATA
 	OMP_NUM_THREADS=1 $(BIN)/python benches/bases.py

@@ -18,11 +18,13 @@ from pdmp._limits import Limits
 from pdmp._native import (
     GP,
     AdditionalForcing,
+    BlockStyles,
     Conditions,
     ContextMap,
     Controller,
     Controllers,
     Demonstration,
+    FactorisedFit,
     Factors,
     FitError,
     GPRegression,
@@ -32,10 +34,12 @@ from pdmp._native import (
     NGnet,
     NGnetRegression,
     Passage,
+    PartialFit,
     PdmpError,
     Prediction,
     RolloutChunks,
     Status,
+    StyleProjection,
     TimeWarp,
     Trajectory,
     ViaPoint,
@@ -49,6 +53,7 @@ from pdmp.realtime import PacedLoop, Tick
 
 if _TYPE_CHECKING:
     from pdmp import autodiff, datasets, evaluation, robots
+    from pdmp._distributed import fit_distributed
     from pdmp.evaluation import evaluate
 else:
 
@@ -56,6 +61,8 @@ else:
         """Imports modules that a control loop does not need at their first use."""
         if name == "evaluate":
             return _import_module("pdmp.evaluation").evaluate
+        if name == "fit_distributed":
+            return _import_module("pdmp._distributed").fit_distributed
         if name in ("autodiff", "datasets", "evaluation", "robots"):
             return _import_module(f"pdmp.{name}")
         raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
@@ -68,11 +75,13 @@ def __dir__() -> list[str]:
 __all__ = [
     "GP",
     "AdditionalForcing",
+    "BlockStyles",
     "Conditions",
     "ContextMap",
     "Controller",
     "Controllers",
     "Demonstration",
+    "FactorisedFit",
     "Factors",
     "FitError",
     "GPRegression",
@@ -84,10 +93,12 @@ __all__ = [
     "NGnetRegression",
     "PacedLoop",
     "Passage",
+    "PartialFit",
     "PdmpError",
     "Prediction",
     "RolloutChunks",
     "Status",
+    "StyleProjection",
     "Tick",
     "TimeWarp",
     "Trajectory",
@@ -100,6 +111,7 @@ __all__ = [
     "evaluation",
     "factorise",
     "fit",
+    "fit_distributed",
     "io",
     "load",
     "plot",

@@ -4,7 +4,7 @@
 # C samples of a regression with P outputs. Times are in s, positions in the unit of each degree of freedom. Arguments are
 # any objects that numpy converts to float64; results are float64.
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
 from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, Unpack, final
 
@@ -34,11 +34,13 @@ _Variable: TypeAlias = Literal[
 
 __all__ = [
     "AdditionalForcing",
+    "BlockStyles",
     "Conditions",
     "ContextMap",
     "Controller",
     "Controllers",
     "Demonstration",
+    "FactorisedFit",
     "Factors",
     "FitError",
     "GP",
@@ -50,10 +52,12 @@ __all__ = [
     "NGnet",
     "NGnetRegression",
     "Passage",
+    "PartialFit",
     "PdmpError",
     "Prediction",
     "RolloutChunks",
     "Status",
+    "StyleProjection",
     "TimeWarp",
     "Trajectory",
     "ViaPoint",
@@ -187,7 +191,7 @@ class Demonstration:
         """First column of each unit quaternion, and the order of its components, "wxyz" or "xyzw"."""
 
 def fit(
-    demos: _Demos,  # M of them, or (M, T, D)
+    demos: _Demos | Sequence[_Demos] | Callable[[], Iterable[_Demos]],  # M of them, or (M, T, D)
     *,
     kind: _Kind = "discrete",
     dt: float | None = None,
@@ -221,9 +225,14 @@ def fit(
 
     Parameters
     ----------
-    demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D)
+    demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D), or blocks
         Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
-        readers return, the values are used. The columns of data frames name the degrees of freedom.
+        readers return, the values are used. The columns of data frames name the degrees of freedom. More demonstrations
+        than memory holds are passed in blocks: a list of lists, or a function without arguments that returns an
+        iterable of lists or arrays (B, T, D), the same at each of two to four calls. Memory then holds one block, a
+        triangular factor of C·D columns and a few numbers for each demonstration; the model is the same but for
+        rounding. Contexts are then those of the demonstrations; warps, landmarks, rotations and `n_styles="auto"` need
+        all demonstrations at once.
     kind : {"discrete", "rhythmic"}
         Movement from a start to a goal, or around an anchor, the default for the result of `preprocessing.cycles`.
     dt : float, optional
@@ -684,6 +693,328 @@ def cycles(
     ValueError
         Recordings without a period or without times, or invalid onsets.
     """
+
+@final
+class PartialFit:
+    """Partial fit of a growing collection of demonstrations, which blocks and other partial fits are added to.
+
+    Its size is that of a triangular factor R with RᵀR = FᵀF for the targets F (M, C·D) of the demonstrations, and of a few
+    numbers for each of them. The order in which parts are merged matters to rounding only. `finish` reads the blocks
+    once more, for their styles.
+
+    Parameters
+    ----------
+    demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (B, T, D)
+        First block. Number of samples, cut-offs of smoothing and, with `tau`, the nominal duration are chosen from it,
+        and hold for all others.
+    kind, dt, period, smoothing, n_samples, dof_scale, tau, alpha_z, beta_z, alpha_x, mu, threads
+        As for `fit`; `period` is one number.
+
+    Raises
+    ------
+    ValueError
+        The demonstrations or options are invalid, or have rotations.
+
+    References
+    ----------
+    Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci. Comput. 34 (2012) A206–A239, https://doi.org/10.1137/080731992
+
+    Examples
+    --------
+    >>> s = np.linspace(0.0, 1.0, 161)
+    >>> def reach(height):
+    ...     return np.column_stack([s**3 * (10 - 15 * s + 6 * s**2), height * np.sin(np.pi * s) ** 2])
+    >>> blocks = [[reach(0.1), reach(0.2)], [reach(0.3)]]
+    >>> partial = pdmp.PartialFit(blocks[0], dt=0.01)
+    >>> other = partial.empty()
+    >>> other.update(blocks[1])
+    >>> partial.merge(other)
+    >>> partial.n_demos
+    3
+    >>> whole = pdmp.fit([demo for block in blocks for demo in block], dt=0.01)
+    >>> np.allclose(partial.finish(blocks).styles, whole.styles, rtol=0.0, atol=1e-10)
+    True
+    """
+    def __new__(
+        cls,
+        demos: _Demos,
+        *,
+        kind: _Kind = "discrete",
+        dt: float | None = None,
+        period: float | None = None,
+        smoothing: Literal["auto"] | float | None = "auto",
+        n_samples: int | None = None,
+        dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
+        tau: float | None = None,
+        alpha_z: float = 25.0,
+        beta_z: float | None = None,
+        alpha_x: float | None = None,
+        mu: float | None = None,
+        threads: int | None = None,
+    ) -> PartialFit: ...
+    @property
+    def n_demos(self) -> int:
+        """Number of demonstrations M so far."""
+    @property
+    def n_dofs(self) -> int:
+        """Number of degrees of freedom D."""
+    @property
+    def n_samples(self) -> int:
+        """Number of samples C of the aligned demonstrations."""
+    @property
+    def kind(self) -> _Kind:
+        """Kind of the movements, "discrete" or "rhythmic"."""
+    def empty(self) -> PartialFit:
+        """Returns a partial fit of no demonstration with the same settings, for blocks that are added elsewhere."""
+    def update(self, demos: _Demos) -> None:
+        """Adds a block of demonstrations.
+
+        Parameters
+        ----------
+        demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (B, T, D)
+            Further demonstrations of the skill.
+
+        Raises
+        ------
+        ValueError
+            The demonstrations are invalid or do not match the others; none is added then.
+        """
+    def merge(self, other: PartialFit) -> None:
+        """Adds the demonstrations of another partial fit after those of this one.
+
+        Parameters
+        ----------
+        other : PartialFit
+            Made with `empty` of this one or of a common one.
+
+        Raises
+        ------
+        ValueError
+            `other` has other settings.
+        """
+    def factorise(
+        self,
+        *,
+        map: _Map = "auto",
+        n_styles: int | None = None,
+        singular_value_share: float | None = None,
+        basis: Literal["gp", "ngnet"] | GP | NGnet = "gp",
+        nominal: int | None = None,
+        transport: Literal["learnt", "immediate"] | None = None,
+        dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
+        threads: int | None = None,
+    ) -> FactorisedFit:
+        """Factorises the targets, and returns what a second pass over the blocks needs.
+
+        Parameters
+        ----------
+        map, n_styles, singular_value_share, basis, nominal, transport, dof_scale, threads
+            As for `fit`; `n_styles` is a number.
+
+        Returns
+        -------
+        FactorisedFit
+
+        Raises
+        ------
+        ValueError
+            An option is invalid, or there is no demonstration.
+        """
+    def finish(
+        self,
+        blocks: Iterable[_Demos] | Callable[[], Iterable[_Demos]],
+        *,
+        map: _Map = "auto",
+        n_styles: int | None = None,
+        singular_value_share: float | None = None,
+        basis: Literal["gp", "ngnet"] | GP | NGnet = "gp",
+        nominal: int | None = None,
+        transport: Literal["learnt", "immediate"] | None = None,
+        dof_scale: Literal["unit", "range"] | ArrayLike | None = None,  # (D,)
+        threads: int | None = None,
+    ) -> Model:
+        """Fits a model to the demonstrations so far, whose blocks are read once more.
+
+        Parameters
+        ----------
+        blocks : iterable of blocks, or function that returns one
+            The demonstrations so far, in the same order, in any blocks.
+        map, n_styles, singular_value_share, basis, nominal, transport, dof_scale, threads
+            As for `fit`; `n_styles` is a number.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        ValueError
+            An option is invalid, there is no demonstration, or the blocks are others.
+        """
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes a file, atomically.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Raises
+        ------
+        OSError
+            The file cannot be written, or its folder does not exist.
+
+        Examples
+        --------
+        >>> import tempfile, pathlib
+        >>> path = pathlib.Path(tempfile.mkdtemp()) / "collection.safetensors"
+        >>> partial = pdmp.PartialFit([np.sin(np.linspace(0.0, 3.0, 200))[:, None]], dt=0.01)
+        >>> partial.save(path)
+        >>> pdmp.PartialFit.load(path).n_demos
+        1
+        """
+    @staticmethod
+    def load(path: str | PathLike[str]) -> PartialFit:
+        """Reads a file that `save` wrote.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        PartialFit
+
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        ModelFileError
+            The file is damaged, not a partial fit, or of another version.
+        """
+    def to_bytes(self) -> bytes:
+        """Returns the contents of a file as bytes."""
+    @staticmethod
+    def from_bytes(data: bytes) -> PartialFit:
+        """Reads a partial fit from the contents of a file.
+
+        Parameters
+        ----------
+        data : bytes
+            Result of `to_bytes`.
+
+        Returns
+        -------
+        PartialFit
+
+        Raises
+        ------
+        ModelFileError
+            The data are damaged, not a partial fit, or of another version.
+        """
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class FactorisedFit:
+    """Factorised targets of a `PartialFit`, which await the styles of its demonstrations.
+
+    Examples
+    --------
+    >>> blocks = [[np.sin(np.linspace(0.0, k, 160))[:, None] for k in (1.0, 2.0)], [np.linspace(0.0, 1.0, 160)[:, None]]]
+    >>> partial = pdmp.PartialFit(blocks[0], dt=0.01)
+    >>> partial.update(blocks[1])
+    >>> factorised = partial.factorise(n_styles=2)
+    >>> projection = factorised.projection
+    >>> parts = [projection.styles(blocks[1], 2), projection.styles(blocks[0], 0)]  # on any machine, in any order
+    >>> factorised.finish(parts).styles.shape
+    (3, 2)
+    """
+    @property
+    def n_styles(self) -> int:
+        """Number of styles J."""
+    @property
+    def projection(self) -> StyleProjection:
+        """Projection of blocks to their styles, which can be sent to other processes."""
+    def finish(self, styles: Iterable[BlockStyles]) -> Model:
+        """Returns the model, given the styles of all blocks in any order.
+
+        Parameters
+        ----------
+        styles : list of BlockStyles
+            Results of `projection.styles`, each demonstration in one of them.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        ValueError
+            Demonstrations are missing, repeated or others than those of the partial fit.
+        """
+
+@final
+class StyleProjection:
+    """Projection of demonstrations to their styles."""
+    def styles(self, demos: _Demos, first: int) -> BlockStyles:
+        """Computes the styles of a block.
+
+        Parameters
+        ----------
+        demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (B, T, D)
+            Demonstrations of the partial fit that follow each other.
+        first : int
+            Index of the first of them among all, from 0.
+
+        Returns
+        -------
+        BlockStyles
+
+        Raises
+        ------
+        ValueError
+            The demonstrations do not match those of the partial fit.
+        """
+    def to_bytes(self) -> bytes:
+        """Returns the projection as bytes."""
+    @staticmethod
+    def from_bytes(data: bytes) -> StyleProjection:
+        """Reads a projection from bytes.
+
+        Parameters
+        ----------
+        data : bytes
+            Result of `to_bytes`.
+
+        Raises
+        ------
+        ModelFileError
+            The data are damaged, of another type or of another version.
+        """
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class BlockStyles:
+    """Styles of a block of demonstrations."""
+    @property
+    def styles(self) -> _Array:  # (B, J)
+        """Styles (B, J); `FactorisedFit.finish` may change their signs."""
+    def to_bytes(self) -> bytes:
+        """Returns the styles as bytes."""
+    @staticmethod
+    def from_bytes(data: bytes) -> BlockStyles:
+        """Reads styles from bytes.
+
+        Parameters
+        ----------
+        data : bytes
+            Result of `to_bytes`.
+
+        Raises
+        ------
+        ModelFileError
+            The data are damaged, of another type or of another version.
+        """
+    def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
 class Model:

@@ -3,11 +3,10 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
-use ndarray::Array2;
 use pdmp_core::context::{ContextMapKind, MapSelection};
 use pdmp_core::learning::regression::Basis;
 use pdmp_core::learning::{
-    CanonicalOptions, DofScaling, NStyles, Stage, TimeScaling, TransportSelection, Truncation, fit_with,
+    CanonicalOptions, DofScaling, NStyles, Stage, TransportSelection, Truncation, fit_blocks, fit_with,
 };
 use pdmp_core::model::Frame;
 use pdmp_core::numerics::Smoothing;
@@ -16,8 +15,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyList, PyMapping, PyString};
 
+use crate::blocks::Blocks;
 use crate::choice::Choice;
-use crate::convert::{items, matrix, numbers, quoted};
+use crate::convert::{items, numbers, quoted};
 use crate::demonstration::{Demonstration, Source};
 use crate::error::{detached, raise};
 use crate::instance;
@@ -25,7 +25,7 @@ use crate::model::Model;
 use crate::regression::{Gp, NGnet};
 use crate::scalar::{Scalar, optional_count, optional_number};
 use crate::trajectory::Trajectory;
-use crate::warp::TimeWarp;
+use crate::warp::time_scaling_of;
 
 /// Fits a movement primitive to demonstrations.
 ///
@@ -34,9 +34,14 @@ use crate::warp::TimeWarp;
 ///
 /// Parameters
 /// ----------
-/// demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D)
+/// demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D), or blocks
 ///     Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
-///     readers return, the values are used. The columns of data frames name the degrees of freedom.
+///     readers return, the values are used. The columns of data frames name the degrees of freedom. More demonstrations
+///     than memory holds are passed in blocks: a list of lists, or a function without arguments that returns an
+///     iterable of lists or arrays (B, T, D), the same at each of two to four calls. Memory then holds one block, a
+///     triangular factor of C·D columns and a few numbers for each demonstration; the model is the same but for
+///     rounding. Contexts are then those of the demonstrations; warps, landmarks, rotations and `n_styles="auto"` need
+///     all demonstrations at once.
 /// kind : {"discrete", "rhythmic"}
 ///     Movement from a start to a goal, or around an anchor, the default for the result of `preprocessing.cycles`.
 /// dt : float, optional
@@ -193,7 +198,8 @@ pub(crate) fn fit(
     let kind = kind.or(crate::labelled::attribute::<PyString>(demos, "kind"));
     let own_contexts = crate::labelled::attribute::<PyMapping>(demos, "contexts");
     let contexts = contexts.or(own_contexts.as_ref());
-    let demos = demonstrations("demos", demos)?;
+    let blocks = Blocks::of(demos)?;
+    let demos = if blocks.is_some() { Vec::new() } else { demonstrations("demos", demos)? };
     let discrete = (optional_number("tau", tau)?, optional_number("alpha_x", alpha_x)?, transport);
     let rhythmic = (optional_number("mu", mu)?, period);
     let mut options = FitOptions::new(canonical_of(kind.of("kind", &KINDS)?, discrete, rhythmic)?);
@@ -220,13 +226,17 @@ pub(crate) fn fit(
         Some(progress) => progress.call1(py, (stage.name(), fraction)).map(drop),
         None => Ok(()),
     };
-    let model = detached(py, report, |progress| fit_with(&demos, &options, progress))?;
+    let model = match &blocks {
+        Some(blocks) => blocks
+            .checked_result(detached(py, report, |progress| fit_blocks(&mut || blocks.pass(), &options, progress)))?,
+        None => detached(py, report, |progress| fit_with(&demos, &options, progress))?,
+    };
     crate::inspection::warn(py, &model.learnt().findings)?;
     Ok(Model(Arc::new(model)))
 }
 
 /// Returns the options of the canonical system. Rejects arguments of the other kind.
-fn canonical_of(
+pub(crate) fn canonical_of(
     kind: Kind,
     (tau, alpha_x, transport): (Option<f64>, Option<f64>, Option<Choice<'_>>),
     (mu, period): (Option<f64>, Option<&Bound<'_, PyAny>>),
@@ -254,7 +264,7 @@ fn canonical_of(
 /// Frames of angular velocities.
 pub(crate) const FRAMES: [(&str, Frame); 2] = [("body", Frame::Body), ("world", Frame::World)];
 
-fn n_styles_of(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
+pub(crate) fn n_styles_of(n_styles: Option<&Bound<'_, PyAny>>, singular_value_share: Option<f64>) -> PyResult<NStyles> {
     let Some(n_styles) = n_styles else {
         return Ok(singular_value_share.map_or(NStyles::AboveNoise, |share| Truncation::Share(share).into()));
     };
@@ -297,15 +307,18 @@ pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResu
             return Ok(demo.get().0.clone());
         }
         if item.is_instance_of::<PyList>() && item.get_item(0).is_ok_and(|one| one.is_instance_of::<Demonstration>()) {
-            let message = format!("demo {m} is a list of demonstrations: put all of them into one list");
+            let message = format!(
+                "demo {m} is a list of demonstrations: put all of them into one list, or pass a list of lists or a \
+                 function that returns an iterator over blocks"
+            );
             return Err(PyValueError::new_err(message));
         }
         Source::of(&format!("demo {m}: position"), item)?.demonstration(m)
     })
 }
 
-const KINDS: [(&str, Kind); 2] = [("discrete", Kind::Discrete), ("rhythmic", Kind::Rhythmic)];
-const TRANSPORTS: [(&str, TransportSelection); 2] =
+pub(crate) const KINDS: [(&str, Kind); 2] = [("discrete", Kind::Discrete), ("rhythmic", Kind::Rhythmic)];
+pub(crate) const TRANSPORTS: [(&str, TransportSelection); 2] =
     [("learnt", TransportSelection::Learnt), ("immediate", TransportSelection::Immediate)];
 
 /// Returns the selection of the context map for argument `map`.
@@ -314,7 +327,7 @@ pub(crate) fn map_of(map: Choice<'_>) -> PyResult<MapSelection> {
     map.of("map", &[("auto", MapSelection::Auto)].into_iter().chain(given).collect::<Vec<_>>())
 }
 
-fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
+pub(crate) fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
     let Some(basis) = basis else { return Ok(Basis::Gp(Default::default())) };
     if let Ok(gp) = basis.cast::<Gp>() {
         return Ok(Basis::Gp(gp.get().0.clone()));
@@ -332,36 +345,8 @@ fn basis_of(basis: Option<&Bound<'_, PyAny>>) -> PyResult<Basis> {
     }
 }
 
-fn time_scaling_of(
-    alignment: Option<&Bound<'_, PyAny>>,
-    landmarks: Option<&Bound<'_, PyAny>>,
-) -> PyResult<TimeScaling> {
-    let alignment = alignment.map_or(Ok(TimeScaling::Linear), alignment_of)?;
-    let landmarks: Option<Array2<f64>> =
-        landmarks.map(|landmarks| matrix("landmarks", "(M, E)", landmarks)).transpose()?;
-    match (alignment, landmarks) {
-        (TimeScaling::Linear, Some(landmarks)) => Ok(TimeScaling::Landmarks(landmarks)),
-        (_, Some(_)) => Err(PyValueError::new_err("alignment and landmarks: pass a warp or landmarks, not both")),
-        (alignment, None) => Ok(alignment),
-    }
-}
-
-fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
-    if let Ok(warp) = alignment.cast::<TimeWarp>() {
-        return Ok(TimeScaling::Warp(warp.get().0.clone()));
-    }
-    match alignment.extract::<String>().as_deref() {
-        Ok("linear") => Ok(TimeScaling::Linear),
-        Ok("warp") => Ok(TimeScaling::WarpIfBetter),
-        _ => {
-            let allowed = "must be \"linear\", \"warp\" or pdmp.TimeWarp(...)";
-            Err(PyValueError::new_err(format!("alignment = {}: {allowed}", quoted(alignment))))
-        }
-    }
-}
-
 /// Argument `smoothing`: None, "auto" or a cut-off in Hz.
-pub(crate) struct SmoothingArgument(Smoothing);
+pub(crate) struct SmoothingArgument(pub(crate) Smoothing);
 
 impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
     type Error = PyErr;
@@ -386,7 +371,7 @@ impl<'py> FromPyObject<'_, 'py> for SmoothingArgument {
     }
 }
 
-fn dof_scale_of(scale: Option<&Bound<'_, PyAny>>) -> PyResult<DofScaling> {
+pub(crate) fn dof_scale_of(scale: Option<&Bound<'_, PyAny>>) -> PyResult<DofScaling> {
     let Some(scale) = scale else { return Ok(DofScaling::Auto) };
     match scale.extract::<String>().as_deref() {
         Ok("range") => Ok(DofScaling::Range),

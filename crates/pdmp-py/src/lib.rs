@@ -3,6 +3,7 @@
 
 mod batch;
 mod batch_conditions;
+mod blocks;
 mod choice;
 mod conditions;
 mod context;
@@ -16,6 +17,7 @@ mod display;
 mod error;
 mod euler;
 mod explorer;
+mod factorised_fit;
 mod factorization;
 mod feasibility;
 mod fit;
@@ -31,6 +33,7 @@ mod motion;
 mod named_contexts;
 mod orientation;
 mod output;
+mod partial_fit;
 mod prediction;
 mod preprocessing;
 mod regression;
@@ -71,6 +74,10 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<via_point::ViaPoint>()?;
     module.add_class::<via_points::AdditionalForcing>()?;
     module.add_class::<via_points::Passage>()?;
+    module.add_class::<partial_fit::PartialFit>()?;
+    module.add_class::<factorised_fit::FactorisedFit>()?;
+    module.add_class::<factorised_fit::StyleProjection>()?;
+    module.add_class::<factorised_fit::BlockStyles>()?;
     module.add_class::<status::Status>()?;
     module.add_class::<controller::Controller>()?;
     module.add_class::<controllers::Controllers>()?;

@@ -1,7 +1,11 @@
-//! Options of a time warp.
+//! Options of the scaling of time.
 
+use ndarray::Array2;
+use pdmp_core::learning::TimeScaling;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::convert::{matrix, quoted};
 use crate::error::raise;
 use crate::scalar::Scalar;
 
@@ -66,5 +70,34 @@ impl TimeWarp {
 
     fn __repr__(&self) -> String {
         format!("pdmp.TimeWarp({}, max_slope={})", self.0.n_segments, self.0.max_slope)
+    }
+}
+
+/// Returns the time scaling of the arguments `alignment` and `landmarks`.
+pub(crate) fn time_scaling_of(
+    alignment: Option<&Bound<'_, PyAny>>,
+    landmarks: Option<&Bound<'_, PyAny>>,
+) -> PyResult<TimeScaling> {
+    let alignment = alignment.map_or(Ok(TimeScaling::Linear), alignment_of)?;
+    let landmarks: Option<Array2<f64>> =
+        landmarks.map(|landmarks| matrix("landmarks", "(M, E)", landmarks)).transpose()?;
+    match (alignment, landmarks) {
+        (TimeScaling::Linear, Some(landmarks)) => Ok(TimeScaling::Landmarks(landmarks)),
+        (_, Some(_)) => Err(PyValueError::new_err("alignment and landmarks: pass a warp or landmarks, not both")),
+        (alignment, None) => Ok(alignment),
+    }
+}
+
+fn alignment_of(alignment: &Bound<'_, PyAny>) -> PyResult<TimeScaling> {
+    if let Ok(warp) = alignment.cast::<TimeWarp>() {
+        return Ok(TimeScaling::Warp(warp.get().0.clone()));
+    }
+    match alignment.extract::<String>().as_deref() {
+        Ok("linear") => Ok(TimeScaling::Linear),
+        Ok("warp") => Ok(TimeScaling::WarpIfBetter),
+        _ => {
+            let allowed = "must be \"linear\", \"warp\" or pdmp.TimeWarp(...)";
+            Err(PyValueError::new_err(format!("alignment = {}: {allowed}", quoted(alignment))))
+        }
     }
 }

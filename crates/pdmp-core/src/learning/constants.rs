@@ -12,6 +12,7 @@ use crate::model::primitive::{MAX_RATE, MAX_TAU};
 use crate::validate::{check_positive, check_range};
 
 /// Constants of a primitive.
+#[derive(Clone, Copy)]
 pub(crate) struct Constants {
     pub(super) attractor: Attractor,
     pub(super) canonical: Canonical,
@@ -22,9 +23,16 @@ impl Constants {
     /// Returns the constants for the given options and the nominal demonstration.
     ///
     /// # Errors
-    /// A constant out of range, or one that the kind of movement does not have.
+    /// As for [`Self::for_duration`].
     pub(super) fn of(options: &FitOptions, aligned: &Aligned) -> Result<Self> {
-        let duration = aligned.durations()[aligned.nominal];
+        Self::for_duration(options, aligned.durations()[aligned.nominal])
+    }
+
+    /// Returns the constants for the given options and the nominal duration, in seconds.
+    ///
+    /// # Errors
+    /// A constant out of range, or one that the kind of movement does not have.
+    pub(super) fn for_duration(options: &FitOptions, duration: f64) -> Result<Self> {
         let attractor = Attractor { alpha_z: options.alpha_z, beta_z: options.beta_z.unwrap_or(options.alpha_z / 4.0) };
         check_rate("alpha_z", attractor.alpha_z)?;
         check_rate("beta_z", attractor.beta_z)?;

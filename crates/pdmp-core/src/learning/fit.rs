@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use ndarray::{Array2, s};
+use ndarray::Array2;
 
 use crate::context::{ContextColumn, ContextMap, tabulate};
 use crate::demonstration::{ContextValue, Demonstration};
@@ -15,22 +15,22 @@ use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::options::TransportSelection;
 use crate::learning::style_selection::cross_validation::StyleSelection;
 use crate::learning::targets::Targets;
-use crate::model::primitive::{Parts, Primitive, end_velocities};
+use crate::model::primitive::Primitive;
 use crate::model::template::WarpTemplate;
 use crate::model::{DemonstrationParameters, FitSummary, Model};
 use crate::preprocessing::inspection::{cycle_ends, inspect, unwound};
 use crate::validate::{check_length, check_names};
 
-use super::braking_rate::{braking_rate, share_accelerations};
+use super::assembly::Foundation;
+use super::braking_rate::share_accelerations;
 use super::constants::Constants;
-use super::movement_metric::{metric, residual_variance};
+use super::movement_metric::{metric, phase_curves, residual_variance, squared_residuals};
 use super::noise_findings;
 use super::options::{CanonicalOptions, FitOptions, NStyles, Stage};
 use super::rotation_timing;
 use super::rotations::{Residuals, vectors_of};
 use super::stiffness::stiffness;
-use super::style_selection::singular_values;
-use super::tabulation::compile;
+use super::style_selection::singular_values::{Recorded, noise_limit, regressors, systematic};
 use super::warp_selection::WarpSelection;
 
 /// Fits a model to demonstrations.
@@ -140,22 +140,20 @@ pub fn fit_with(
     let training = Training { aligned: &aligned, targets: &targets, transport: &transport, constants: &constants };
     let factors = training.factors(options, &dof_scale, contexts.as_ref(), &mut factorising)?;
     findings.extend(noise_findings::noisy(&aligned.noise, &ranges, &names, &units));
-    let no_units = units.iter().all(String::is_empty);
-    let truncated = noise_findings::truncation_error(&targets, &factors, &aligned.noise, &dof_scale, &names);
-    findings.extend(truncated.filter(|_| no_units));
+    if units.iter().all(String::is_empty) {
+        let squares = |d| noise_findings::squares(targets.forcing.view(), names.len(), d);
+        let own = targets.ranges();
+        let truncated = noise_findings::truncation_error(&own, squares, &factors, &aligned.noise, &dof_scale, &names);
+        findings.extend(truncated);
+    }
     let Targets { forcing, goals, starts, anchors, .. } = targets;
     drop(forcing);
 
-    progress(Stage::Regress, 0.0)?;
-    let clock = constants.canonical.clock(aligned.n_samples);
-    let basis_targets = by_clock(&factors.basis_targets, &dof_scale);
-    let mut regressing = |share| progress(Stage::Regress, share);
-    let regression = options.basis.regress(constants.domain(), &clock, basis_targets.view(), &mut regressing)?;
-
-    let mut compiling = |share| progress(Stage::Compile, share);
-    let shape = (factors.basis_targets.nrows(), demos[0].n_dofs());
-    let n_samples = clock.len();
-    let forcing_table = compile(constants.canonical, shape, n_samples, regression.as_ref(), threads, &mut compiling)?;
+    let n_samples = aligned.n_samples;
+    let breaks = aligned.breaks.clone();
+    let foundation =
+        Foundation { constants, transport, dof_scale, ranges, accelerations, names, units, breaks, n_samples, vectors };
+    let (forcing_table, regression) = foundation.forcing_table(&factors.basis_targets, options, progress)?;
 
     let segment_durations = aligned.segment_durations.clone();
     let (columns, contexts) = contexts.unzip();
@@ -172,22 +170,20 @@ pub fn fit_with(
         contexts,
         nominal: aligned.nominal,
     };
-    let Constants { attractor, canonical, tau } = constants;
-    let breaks = aligned.breaks.clone();
-    let nominal = demonstrated.nominal_conditions(canonical.kind());
-    let braking = (!transport.is_immediate()).then(|| {
-        let end_velocities = end_velocities(attractor, &forcing_table, names.len());
-        braking_rate(attractor, &accelerations, demonstrated.styles.view(), &end_velocities, &vectors)
-    });
-    let parts = Parts { attractor, forcing_table, transport, braking, tau, names, units, ranges, breaks, nominal };
-    let primitive = Arc::new(Primitive::new(parts));
-    findings.extend(stiffness(&primitive, &aligned)?);
+    let dof_scale = foundation.dof_scale.clone();
+    let primitive = foundation.primitive(forcing_table, &demonstrated);
+    let nominal = demonstrated.nominal;
+    findings.extend(stiffness(&primitive, (nominal, n_samples), |position| aligned.sample(nominal, position))?);
     findings.extend(residuals.iter().flat_map(|residuals| residuals.findings.iter().cloned()));
     let noise = aligned.noise.clone();
-    let contexts = columns.zip(demonstrated.contexts.as_ref());
-    let learn = |contexts| learn_map(contexts, &primitive, &demonstrated, aligned, options);
-    let (map, residual_variance) = contexts.map(learn).transpose()?.unzip();
-    let regression = regression.describe();
+    let learn = |columns| {
+        let map = learn_map(columns, &primitive, &demonstrated, options)?;
+        let outputs = demonstrated.outputs(primitive.kind());
+        let curves = phase_curves(&primitive)?;
+        let squares = squared_residuals(primitive.kind(), &curves, outputs.view(), aligned);
+        Ok::<_, Error>((map, residual_variance(squares, outputs.nrows(), &noise)))
+    };
+    let (map, residual_variance) = columns.map(learn).transpose()?.unzip();
     let learnt = FitSummary {
         n_samples,
         noise,
@@ -206,22 +202,23 @@ pub fn fit_with(
     Ok(Model { primitive, demonstrated, learnt, map })
 }
 
-/// Learns the map from contexts (M, Q) to movements, and the residual variance (S, D) of the movements.
-fn learn_map(
-    (columns, contexts): (Vec<ContextColumn>, &Array2<f64>),
+/// Learns the map from the contexts of the demonstrations to their movements.
+pub(super) fn learn_map(
+    columns: Vec<ContextColumn>,
     primitive: &Arc<Primitive>,
     demonstrated: &DemonstrationParameters,
-    aligned: Aligned,
     options: &FitOptions,
-) -> Result<(ContextMap, Array2<f64>)> {
+) -> Result<ContextMap> {
     let outputs = demonstrated.outputs(primitive.kind());
     let metric = metric(primitive, outputs.view(), demonstrated.segment_durations.view())?;
+    let no_contexts = Error::Argument { name: "contexts", problem: "is empty: pass one row per movement" };
+    let contexts = demonstrated.contexts.as_ref().ok_or(no_contexts)?;
     let map = ContextMap::learn(columns, contexts, outputs.view(), metric.view(), options.map)?;
-    Ok((map.with_names(options.context_names.clone())?, residual_variance(primitive, outputs.view(), aligned)?))
+    map.with_names(options.context_names.clone())
 }
 
 /// Types of the context columns (Q,), and the contexts (M, Q) as numbers.
-type Contexts = (Vec<ContextColumn>, Array2<f64>);
+pub(super) type Contexts = (Vec<ContextColumn>, Array2<f64>);
 
 /// Scales the time of the demonstrations, and returns the template of the warp that is kept, if any.
 fn scale_time(
@@ -298,8 +295,17 @@ impl Training<'_> {
         let forcing = targets.forcing.view();
         match options.n_styles {
             NStyles::AboveNoise => {
-                let noise = singular_values::noise_limit(aligned, constants, transport, dof_scale, options.threads)?;
-                singular_values::systematic(forcing, noise, contexts, progress)
+                let durations = aligned.durations();
+                let n_recorded: Vec<usize> = (0..durations.len()).map(|m| aligned.demo(m).n_samples()).collect();
+                let recorded = Recorded {
+                    noise: &aligned.noise,
+                    durations: &durations,
+                    n_recorded: &n_recorded,
+                    n_samples: aligned.n_samples,
+                };
+                let noise = noise_limit(&recorded, constants, transport, dof_scale, options.threads)?;
+                let regressors = contexts.map(|(columns, numbers)| regressors(columns, numbers));
+                systematic(forcing, durations.len(), noise, regressors.as_ref(), progress)
             }
             NStyles::Truncated(count) => Factors::of(forcing, count, progress),
             NStyles::CrossValidated => {
@@ -318,21 +324,8 @@ impl Training<'_> {
     }
 }
 
-/// Rearranges F_basis (J, C·D) to outputs over the clock (C, J·D), in the unit of each DoF.
-fn by_clock(basis: &Array2<f64>, dof_scale: &[f64]) -> Array2<f64> {
-    let n_dofs = dof_scale.len();
-    let mut outputs = Array2::zeros((basis.ncols() / n_dofs, basis.nrows() * n_dofs));
-    for (c, mut output) in outputs.rows_mut().into_iter().enumerate() {
-        let forcing = basis.slice(s![.., c * n_dofs..(c + 1) * n_dofs]);
-        for ((output, forcing), scale) in output.iter_mut().zip(forcing).zip(dof_scale.iter().cycle()) {
-            *output = forcing * scale;
-        }
-    }
-    outputs
-}
-
 /// Returns the given contexts, or those of the demonstrations; `None` if there are none.
-fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> Result<Option<Contexts>> {
+pub(super) fn contexts_of(demos: &[Demonstration], given: Option<&[Vec<ContextValue>]>) -> Result<Option<Contexts>> {
     if let Some(contexts) = given {
         check_length("contexts", contexts.len(), demos.len(), "demonstration")?;
     }

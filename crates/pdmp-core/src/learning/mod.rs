@@ -3,6 +3,7 @@
 //! [`fit`] composes the four steps of Section 3.2: alignment, targets, factorisation, regression.
 
 pub(crate) mod alignment;
+mod assembly;
 mod braking_rate;
 mod constants;
 mod context_folds;
@@ -17,6 +18,7 @@ pub mod regression;
 mod rotation_timing;
 mod rotations;
 mod stiffness;
+mod streaming;
 mod style_inference;
 pub(crate) mod style_selection;
 mod tabulation;
@@ -28,4 +30,5 @@ pub use alignment::TimeScaling;
 pub use factorization::{Factors, Truncation};
 pub use fit::{fit, fit_with};
 pub use options::{CanonicalOptions, DofScaling, FitOptions, NStyles, Stage, TransportSelection};
+pub use streaming::{BlockStyles, Blocks, FactorisedFit, PartialFit, StyleProjection, fit_blocks};
 pub use style_inference::{StyleOptions, style_of};

@@ -1,7 +1,8 @@
 //! Findings of a fit about noise, and about degrees of freedom that its styles truncate.
 
+use ndarray::ArrayView2;
+
 use crate::learning::factorization::Factors;
-use crate::learning::targets::Targets;
 use crate::model::finding::Finding;
 use crate::numerics::smoothing_spline::Noise;
 
@@ -51,27 +52,28 @@ pub(super) fn noisy(noise: &Noise, ranges: &[f64], names: &[String], units: &[St
 /// these 22 fits are; the small columns of franka_tasks and raise_hand_bandai are reproduced worse too, below the limit.
 ///
 /// S is orthonormal and F_basis = SᵀF, so that ‖F_d − S·F_basis,d‖² = ‖F_d‖² − ‖F_basis,d‖² for each DoF d.
+///
+/// `all` returns the squares ‖F_d‖² of a DoF.
 pub(super) fn truncation_error(
-    targets: &Targets,
+    ranges: &[f64],
+    all: impl Fn(usize) -> f64,
     factors: &Factors,
     noise: &Noise,
     dof_scale: &[f64],
     names: &[String],
 ) -> Option<Finding> {
-    let (ranges, n_dofs) = (targets.ranges(), names.len());
+    let n_dofs = names.len();
     let largest = ranges.iter().fold(0.0f64, |most, range| most.max(*range));
     let scaled: Vec<f64> = ranges.iter().zip(dof_scale).map(|(range, scale)| range / scale).collect();
     let largest_scaled = scaled.iter().fold(0.0f64, |most, range| most.max(*range));
-    let squares = |rows: &ndarray::Array2<f64>, d: usize| {
-        rows.rows().into_iter().flat_map(|row| row.into_iter().skip(d).step_by(n_dofs)).map(|f| f * f).sum::<f64>()
-    };
     let small = |d: &usize| {
         let moves = ranges[*d] > MIN_SIGNAL_TO_NOISE * noise.levels()[*d];
         moves && scaled[*d] * MIN_RANGE_RATIO < largest_scaled
     };
     let share = |d: usize| {
-        let all = squares(&targets.forcing, d);
-        let share = (1.0 - squares(&factors.basis_targets, d) / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
+        let all = all(d);
+        let kept = squares(factors.basis_targets.view(), n_dofs, d);
+        let share = (1.0 - kept / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
         if all > 0.0 { share } else { 0.0 }
     };
     let worst = (0..n_dofs).filter(small).map(|d| (d, share(d))).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -82,4 +84,9 @@ pub(super) fn truncation_error(
         share,
         n_styles: factors.styles.ncols(),
     })
+}
+
+/// Returns the sum of the squares of a DoF in rows (M, C·D).
+pub(super) fn squares(rows: ArrayView2<f64>, n_dofs: usize, d: usize) -> f64 {
+    rows.rows().into_iter().flat_map(|row| row.into_iter().skip(d).step_by(n_dofs)).map(|f| f * f).sum()
 }

@@ -10,7 +10,6 @@ use ndarray::Array2;
 
 use crate::error::Result;
 use crate::kind::Kind;
-use crate::learning::alignment::Aligned;
 use crate::model::conditions::Conditions;
 use crate::model::finding::Finding;
 use crate::model::primitive::Primitive;
@@ -24,17 +23,21 @@ const MAX_RATIO: f64 = 3.0;
 /// 18 000 times at 4.
 const RESOLVED: f64 = 0.17;
 
-/// Compares the accelerations of the nominal demonstration with those of its reproduction, and returns the worst DoF.
-pub(super) fn stiffness(primitive: &Arc<Primitive>, aligned: &Aligned) -> Result<Option<Finding>> {
+/// Compares the accelerations of the nominal demonstration, sampled by `sample`, with those of its reproduction, and returns
+/// the worst DoF.
+pub(super) fn stiffness(
+    primitive: &Arc<Primitive>,
+    (demo, n_samples): (usize, usize),
+    sample: impl FnOnce(&mut [f64]),
+) -> Result<Option<Finding>> {
     let (kind, n_dofs) = (primitive.kind(), primitive.n_dofs());
-    let (demo, n_samples) = (aligned.nominal, aligned.n_samples);
     // A cycle has no start, and its steady state no transient.
     let step = primitive.canonical().extent() / kind.steps(n_samples) as f64;
     if kind == Kind::Rhythmic || primitive.attractor().alpha_z * step <= RESOLVED {
         return Ok(None);
     }
     let mut position = Array2::zeros((n_samples, n_dofs));
-    aligned.sample(demo, crate::validate::row_major_mut(&mut position));
+    sample(crate::validate::row_major_mut(&mut position));
     let dt = primitive.duration() / kind.steps(n_samples) as f64;
     let reproduced = rollout(primitive, &Conditions::default(), TimeGrid { dt, duration: None })?.acceleration;
     let mut worst = None;

@@ -13,7 +13,7 @@ use crate::dynamics::transport::Transport;
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::learning::alignment::Aligned;
-use crate::learning::transport_profile::{profile_samples, transport_profile};
+use crate::learning::transport_profile::{ProfileSums, profile_samples, transport_profile};
 use crate::numerics::simd::{F64x4, gather, groups, pack, scatter, unpack};
 use crate::numerics::spline::Knots;
 use crate::numerics::threads::Threads;
@@ -96,6 +96,12 @@ impl Targets {
         transport_profile(displacements, reaches, canonical)
     }
 
+    /// Returns the sums for the transport profile of these movements, with DoFs in the given units (D,).
+    pub(crate) fn profile_sums(&self, unit: &[f64]) -> ProfileSums {
+        let unit = aview1(unit);
+        ProfileSums::of((&self.displacements / &unit).view(), (&self.goals - &self.starts) / unit)
+    }
+
     /// Returns the largest |y″| of each DoF with respect to the clock (D,).
     pub(crate) fn largest_accelerations(&self) -> Vec<f64> {
         largest(&self.accelerations)
@@ -105,15 +111,8 @@ impl Targets {
     ///
     /// As a target is linear in its movement, that of (g − y₀)·lag, interpolated by the same spline, is subtracted.
     pub(crate) fn carry(&mut self, transport: &Transport, attractor: Attractor, canonical: Canonical) {
-        if transport.is_immediate() {
-            return;
-        }
         let n_dofs = self.starts.ncols();
-        let inversion = TargetComputation::new(attractor, canonical, self.forcing.ncols() / n_dofs);
-        let mut lag: Vec<f64> = inversion.clock.iter().map(|&u| transport.lag(u).value).collect();
-        let mut slopes = vec![0.0; lag.len()];
-        inversion.knots.slopes(&lag, &mut slopes);
-        inversion.inverse.target(&mut lag, &slopes, 0.0, false);
+        let Some(lag) = lag_target(transport, attractor, canonical, self.forcing.ncols() / n_dofs) else { return };
         let rows = self.forcing.rows_mut().into_iter().zip(self.goals.rows()).zip(self.starts.rows());
         for ((mut row, goal), start) in rows {
             let reach = &goal - &start;
@@ -130,6 +129,24 @@ impl Targets {
             self.forcing.iter_mut().zip(dof_scale.iter().cycle()).for_each(|(f, scale)| *f /= scale);
         }
     }
+}
+
+/// Returns the target (C,) of the lag of the moving frame; `None` if it does not lag.
+pub(crate) fn lag_target(
+    transport: &Transport,
+    attractor: Attractor,
+    canonical: Canonical,
+    n_samples: usize,
+) -> Option<Vec<f64>> {
+    if transport.is_immediate() {
+        return None;
+    }
+    let inversion = TargetComputation::new(attractor, canonical, n_samples);
+    let mut lag: Vec<f64> = inversion.clock.iter().map(|&u| transport.lag(u).value).collect();
+    let mut slopes = vec![0.0; lag.len()];
+    inversion.knots.slopes(&lag, &mut slopes);
+    inversion.inverse.target(&mut lag, &slopes, 0.0, false);
+    Some(lag)
 }
 
 /// Computation of targets, with the quantities that all demonstrations share.

@@ -15,7 +15,7 @@
 //! both ends.
 
 use nalgebra::{DMatrix, DVector};
-use ndarray::{Array2, Array3, ArrayView3, Axis};
+use ndarray::{Array1, Array2, Array3, ArrayView3, Axis, concatenate, s, stack};
 
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::transport::{DEGREE, MIN_CELLS, Transport};
@@ -35,6 +35,125 @@ const MAX_SAMPLES: usize = 16 * MAX_CELLS + 1;
 /// 1.017, and noise of 1 % of constant starts and goals then raises the acceleration to 2.6 instead of 1.35 times.
 const PRIOR_VARIATION: f64 = 0.045;
 
+/// Sums over demonstrations from which the profile is learnt; those of two sets of demonstrations can be merged.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ProfileSums {
+    /// Number of demonstrations.
+    n: f64,
+    /// Mean reach r̄ (D,).
+    reach: Array1<f64>,
+    /// Mean displacement x̄ (S, D).
+    displacement: Array2<f64>,
+    /// Σₙ (xₙ − x̄)(rₙ − r̄) of each DoF (S, D).
+    covered: Array2<f64>,
+    /// Σₙ (rₙ − r̄)² of each DoF (D,).
+    variation: Array1<f64>,
+    /// Σₙ xₙ² of each DoF, averaged over the samples (D,).
+    size: Array1<f64>,
+    /// Sum of the arc-length progress (S,) of the movements that are not at rest.
+    progress: Array1<f64>,
+    /// Number of movements that are not at rest.
+    n_moving: f64,
+}
+
+impl ProfileSums {
+    /// Returns the sums over no demonstration.
+    pub(crate) fn zero(n_samples: usize, n_dofs: usize) -> Self {
+        Self {
+            n: 0.0,
+            reach: Array1::zeros(n_dofs),
+            displacement: Array2::zeros((n_samples, n_dofs)),
+            covered: Array2::zeros((n_samples, n_dofs)),
+            variation: Array1::zeros(n_dofs),
+            size: Array1::zeros(n_dofs),
+            progress: Array1::zeros(n_samples),
+            n_moving: 0.0,
+        }
+    }
+
+    /// Sums over demonstrations with displacements x = y − y₀ (M, S, D), at equal steps of the clock, and reaches
+    /// r = g − y₀ (M, D). Both are in units in which the DoFs are comparable, and their squares neither overflow nor
+    /// underflow.
+    pub(crate) fn of(displacements: ArrayView3<f64>, mut reaches: Array2<f64>) -> Self {
+        let (n_demos, n_samples, n_dofs) = displacements.dim();
+        let mut sums = Self::zero(n_samples, n_dofs);
+        sums.n = n_demos as f64;
+        sums.reach = reaches.mean_axis(Axis(0)).unwrap_or(sums.reach);
+        sums.displacement = displacements.mean_axis(Axis(0)).unwrap_or(sums.displacement);
+        reaches -= &sums.reach;
+        for (displacement, reach) in displacements.outer_iter().zip(reaches.rows()) {
+            sums.covered += &(&displacement * &reach);
+            sums.size += &(displacement.map_axis(Axis(0), |x| x.dot(&x)) / n_samples as f64);
+        }
+        sums.variation = reaches.map_axis(Axis(0), |r| r.dot(&r));
+        (sums.progress, sums.n_moving) = arc_length_progress(displacements);
+        sums
+    }
+
+    /// Returns the number of samples S.
+    pub(crate) fn n_samples(&self) -> usize {
+        self.progress.len()
+    }
+
+    /// Returns the sums of the samples (S, 2D + 1) and of the DoFs (3, D), and the numbers of all and of moving demonstrations.
+    pub(crate) fn numbers(&self) -> (Array2<f64>, Array2<f64>, [f64; 2]) {
+        let progress = self.progress.view().insert_axis(Axis(1));
+        let samples = concatenate![Axis(1), self.displacement, self.covered, progress];
+        let dofs = stack![Axis(0), self.reach, self.variation, self.size];
+        (samples, dofs, [self.n, self.n_moving])
+    }
+
+    /// Returns the sums with the given numbers.
+    pub(crate) fn from_numbers(samples: &Array2<f64>, dofs: &Array2<f64>, [n, n_moving]: [f64; 2]) -> Self {
+        let n_dofs = dofs.ncols();
+        let [reach, variation, size] = [0, 1, 2].map(|k| dofs.row(k).to_owned());
+        Self {
+            n,
+            reach,
+            displacement: samples.slice(s![.., ..n_dofs]).to_owned(),
+            covered: samples.slice(s![.., n_dofs..2 * n_dofs]).to_owned(),
+            variation,
+            size,
+            progress: samples.column(2 * n_dofs).to_owned(),
+            n_moving,
+        }
+    }
+
+    /// Adds the sums over further demonstrations (Chan, Golub, LeVeque, COMPSTAT 1982, 30–41).
+    pub(crate) fn merge(&mut self, other: &Self) {
+        let n = self.n + other.n;
+        if other.n == 0.0 {
+            return;
+        }
+        let (reach, displacement) = (&other.reach - &self.reach, &other.displacement - &self.displacement);
+        let (share, weight) = (other.n / n, self.n * other.n / n);
+        self.covered += &(&other.covered + &(&displacement * &reach * weight));
+        self.variation += &(&other.variation + &(&reach * &reach * weight));
+        self.reach.scaled_add(share, &reach);
+        self.displacement.scaled_add(share, &displacement);
+        self.size += &other.size;
+        self.progress += &other.progress;
+        (self.n, self.n_moving) = (n, self.n_moving + other.n_moving);
+    }
+
+    /// Learns the profile, with DoFs weighted by the squares of the given factors (D,).
+    pub(crate) fn profile(&self, factors: &[f64], canonical: Canonical) -> Result<Transport> {
+        let n_samples = self.progress.len();
+        let weights = Array1::from_iter(factors.iter().map(|factor| factor * factor));
+        let covered = self.covered.dot(&weights);
+        let (size, variation) = (self.size.dot(&weights), self.variation.dot(&weights));
+        let prior = PRIOR_VARIATION * PRIOR_VARIATION * size.max(f64::EPSILON);
+        let weight = variation * variation / (variation * variation + prior * prior);
+        let per_variation = weight / variation.max(f64::MIN_POSITIVE);
+        let arc = |c: usize| match self.n_moving {
+            0.0 => c as f64 / (n_samples - 1) as f64,
+            n => self.progress[c] / n,
+        };
+        let share = |c: usize| (covered[c] * per_variation + (1.0 - weight) * arc(c)).clamp(0.0, 1.0);
+        Transport::from_coefficients(spline(&isotonic((0..n_samples).map(share)))?, canonical)
+    }
+}
+
 /// Learns the profile from displacements x = y − y₀ (M, S, D), at equal steps of the clock, and reaches r = g − y₀ (M, D).
 ///
 /// Both are in units in which the DoFs are comparable.
@@ -43,28 +162,14 @@ pub(super) fn transport_profile(
     mut reaches: Array2<f64>,
     canonical: Canonical,
 ) -> Result<Transport> {
-    let n_samples = displacements.len_of(Axis(1));
     // Scaled so that squares neither overflow nor underflow.
     let largest = displacements.iter().chain(&reaches).fold(0.0f64, |largest, x| largest.max(x.abs()));
     if largest > 0.0 {
         displacements.mapv_inplace(|x| x / largest);
         reaches.mapv_inplace(|x| x / largest);
     }
-    reaches -= &reaches.mean_axis(Axis(0)).unwrap_or_default();
-    let (mut covered, mut size) = (vec![0.0; n_samples], 0.0);
-    for (displacement, reach) in displacements.outer_iter().zip(reaches.rows()) {
-        for (covered, x) in covered.iter_mut().zip(displacement.rows()) {
-            *covered += x.dot(&reach);
-            size += x.dot(&x) / n_samples as f64;
-        }
-    }
-    let variation: f64 = reaches.iter().map(|x| x * x).sum();
-    let prior = PRIOR_VARIATION * PRIOR_VARIATION * size.max(f64::EPSILON);
-    let weight = variation * variation / (variation * variation + prior * prior);
-    let per_variation = weight / variation.max(f64::MIN_POSITIVE);
-    let share = |(covered, arc): (&f64, f64)| (covered * per_variation + (1.0 - weight) * arc).clamp(0.0, 1.0);
-    let profile = isotonic(covered.iter().zip(arc_length_progress(displacements.view())).map(share));
-    Transport::from_coefficients(spline(&profile)?, canonical)
+    let factors = vec![1.0; reaches.ncols()];
+    ProfileSums::of(displacements.view(), reaches).profile(&factors, canonical)
 }
 
 /// Returns the indices of the samples, out of `n`, that the profile is learnt from.
@@ -73,30 +178,24 @@ pub(super) fn profile_samples(n: usize) -> impl ExactSizeIterator<Item = usize> 
     (0..n_selected).map(move |k| k * (n - 1) / (n_selected - 1))
 }
 
-/// Returns the mean arc-length progress (S,), from 0 to 1, of the movements (M, S, D) that are not at rest.
-fn arc_length_progress(displacements: ArrayView3<f64>) -> Vec<f64> {
+/// Returns the sum of the arc-length progress (S,), from 0 to 1, of the movements (M, S, D) that are not at rest, and their
+/// number.
+fn arc_length_progress(displacements: ArrayView3<f64>) -> (Array1<f64>, f64) {
     let n_samples = displacements.len_of(Axis(1));
-    let (mut mean, mut n) = (vec![0.0; n_samples], 0.0);
+    let (mut sum, mut n) = (Array1::zeros(n_samples), 0.0);
+    let mut along = vec![0.0; n_samples];
     for displacement in displacements.outer_iter() {
-        let mut along = Vec::with_capacity(n_samples);
-        let mut length = 0.0;
-        along.push(0.0);
         for c in 1..n_samples {
-            let step = &displacement.row(c) - &displacement.row(c - 1);
-            length += step.dot(&step).sqrt();
-            along.push(length);
+            let steps = displacement.row(c).into_iter().zip(displacement.row(c - 1));
+            along[c] = along[c - 1] + steps.map(|(x, before)| (x - before).powi(2)).sum::<f64>().sqrt();
         }
+        let length = along[n_samples - 1];
         if length > 0.0 {
             n += 1.0;
-            mean.iter_mut().zip(along).for_each(|(mean, along)| *mean += along / length);
+            sum.iter_mut().zip(&along).for_each(|(sum, along)| *sum += along / length);
         }
     }
-    if n > 0.0 {
-        mean.iter_mut().for_each(|mean| *mean /= n);
-    } else {
-        mean.iter_mut().enumerate().for_each(|(c, mean)| *mean = c as f64 / (n_samples - 1) as f64);
-    }
-    mean
+    (sum, n)
 }
 
 /// Returns the coefficients of the increasing smoothing spline through equally spaced values of a profile.

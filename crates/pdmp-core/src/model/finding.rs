@@ -154,6 +154,30 @@ pub enum Finding {
     },
 }
 
+impl Finding {
+    /// Returns the finding with the index of its demonstration increased by `first`.
+    #[cfg(feature = "learning")]
+    pub(crate) fn shifted(mut self, first: usize) -> Self {
+        match &mut self {
+            Self::CloseStamps { demo, .. }
+            | Self::Zeros { demo, .. }
+            | Self::Padded { demo, .. }
+            | Self::Wrap { demo, .. }
+            | Self::TurnsApart { demo, .. }
+            | Self::OpenCycle { demo, .. }
+            | Self::RepeatedEnd { demo }
+            | Self::FarRotation { demo, .. }
+            | Self::Stiff { demo, .. } => *demo += first,
+            Self::Counter { .. }
+            | Self::Clock { .. }
+            | Self::Quaternion { .. }
+            | Self::Noisy { .. }
+            | Self::TruncatedDof { .. } => {}
+        }
+        self
+    }
+}
+
 /// Location of a sample in a demonstration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleLocation {

@@ -119,10 +119,7 @@ impl Alignment {
         }
         let durations: Vec<f64> = clocks.iter().map(|clock| clock.duration).collect();
         let nominal = self.nominal_of(&durations)?;
-        let steps = self.kind.steps(demos[nominal].n_samples());
-        let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * MIN_STEPS.div_ceil(steps)));
-        let valid = (MIN_SAMPLES_PER_DEMONSTRATION..=MAX_SAMPLES).contains(&n_samples);
-        check_range("n_samples", n_samples as f64, valid, "must lie between 4 and 1e6")?;
+        let n_samples = self.n_samples_for(demos[nominal].n_samples())?;
         let (kind, noise) = (self.kind, Noise::none(n_dofs));
         let (warps, breaks) = (vec![None; demos.len()], vec![0.0, 1.0]);
         let segment_durations = ndarray::Array1::from_vec(durations).insert_axis(Axis(1));
@@ -131,20 +128,37 @@ impl Alignment {
         Ok(aligned)
     }
 
+    /// Checks a given cut-off against the sampling rate and period of each demonstration.
+    ///
+    /// # Errors
+    /// A cut-off out of range.
+    pub(crate) fn check_cut_off(&self, aligned: &Aligned) -> Result<()> {
+        let Smoothing::CutOff { .. } = self.smoothing else { return Ok(()) };
+        let check = |m: usize| self.smoothing.check(&aligned.samples(m, &aligned.seconds(m)));
+        (0..aligned.n_demos()).try_for_each(|m| check(m).map_err(|error| error.in_demo(m)))
+    }
+
     /// Estimates the measurement noise from a pool of demonstrations.
     fn noise(&self, aligned: &Aligned, threads: Threads) -> Result<Noise> {
-        if let Smoothing::CutOff { .. } = self.smoothing {
-            for m in 0..aligned.n_demos() {
-                self.smoothing.check(&aligned.samples(m, &aligned.seconds(m))).map_err(|error| error.in_demo(m))?;
-            }
-        }
+        self.check_cut_off(aligned)?;
         let pool: Vec<(usize, Vec<f64>)> = pooled(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
         let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
         Noise::estimate(self.smoothing, &samples, &self.vectors, MIN_DECIMATED, threads)
     }
 
+    /// Returns the number of samples C for that of the nominal demonstration.
+    ///
+    /// # Errors
+    /// A given number out of range.
+    pub(crate) fn n_samples_for(&self, nominal: usize) -> Result<usize> {
+        let steps = self.kind.steps(nominal);
+        let n_samples = self.n_samples.unwrap_or(self.kind.samples(steps * MIN_STEPS.div_ceil(steps)));
+        let valid = (MIN_SAMPLES_PER_DEMONSTRATION..=MAX_SAMPLES).contains(&n_samples);
+        check_range("n_samples", n_samples as f64, valid, "must lie between 4 and 1e6").map(|()| n_samples)
+    }
+
     /// Returns the given nominal index, or that of the lower median of the durations, the first of equals.
-    fn nominal_of(&self, durations: &[f64]) -> Result<usize> {
+    pub(crate) fn nominal_of(&self, durations: &[f64]) -> Result<usize> {
         match self.nominal {
             Some(nominal) => {
                 let allowed = "must be the index of a demonstration, from 0";

@@ -111,22 +111,38 @@ impl Factors {
         styles: Truncation,
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Self> {
+        Self::of_compressed(targets, targets.nrows(), styles, progress)
+    }
+
+    /// Computes the factors of A (K, C·D), such as a triangular factor, with AᵀA = FᵀF for the targets F of `n_demos`
+    /// demonstrations. F_basis and the singular values are those of F.
+    ///
+    /// # Errors
+    /// As for [`Self::of`].
+    pub(crate) fn of_compressed(
+        targets: ArrayView2<f64>,
+        n_demos: usize,
+        styles: Truncation,
+        progress: &mut dyn FnMut(f64) -> Result<()>,
+    ) -> Result<Self> {
         if targets.is_empty() {
             return Err(Error::Argument {
                 name: "targets",
                 problem: "is empty: pass one row per demonstration, one column per value",
             });
         }
-        styles.check(targets.nrows(), "demonstrations")?;
+        styles.check(n_demos, "demonstrations")?;
         styles.check(targets.ncols(), "target values")?;
-        let Some(scaled) = ScaledTargets::of(targets)? else { return Ok(Self::zero(targets.dim(), styles)) };
+        let Some(scaled) = ScaledTargets::of(targets, n_demos)? else {
+            return Ok(Self::zero(targets.dim(), n_demos, styles));
+        };
         scaled.factors(styles, progress)
     }
 
     /// Returns the factors of targets that are all zero.
-    fn zero((rows, columns): (usize, usize), styles: Truncation) -> Self {
+    fn zero((rows, columns): (usize, usize), n_demos: usize, styles: Truncation) -> Self {
         let singular_values = vec![0.0; rows.min(columns)];
-        let n_styles = styles.among(&singular_values, rows);
+        let n_styles = styles.among(&singular_values, n_demos);
         let styles = Array2::from_shape_fn((rows, n_styles), |(i, j)| if i == j { 1.0 } else { 0.0 });
         Self { styles, basis_targets: Array2::zeros((n_styles, columns)), singular_values, error: 0.0 }
     }
@@ -135,6 +151,7 @@ impl Factors {
 /// Targets F, divided by a power of two so that their fourth powers neither overflow nor underflow.
 struct ScaledTargets<'a> {
     targets: CowArray<'a, f64, Ix2>,
+    n_demos: usize,
     scale: f64,
     /// ‖F‖².
     squares: f64,
@@ -151,10 +168,10 @@ struct Products(Mat<f64>);
 
 impl<'a> ScaledTargets<'a> {
     /// Scales the targets; returns `None` if all are zero.
-    fn of(targets: ArrayView2<'a, f64>) -> Result<Option<Self>> {
+    fn of(targets: ArrayView2<'a, f64>, n_demos: usize) -> Result<Option<Self>> {
         let squares = targets.as_slice().map(squares).filter(|squares| (1e-40..1e40).contains(squares));
         if let Some(squares) = squares {
-            return Ok(Some(Self { targets: targets.into(), scale: 1.0, squares }));
+            return Ok(Some(Self { targets: targets.into(), n_demos, scale: 1.0, squares }));
         }
         check_matrix("targets", targets)?;
         let largest = targets.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -166,7 +183,7 @@ impl<'a> ScaledTargets<'a> {
         let mut scaled = zeros("targets", targets.dim())?;
         scaled.zip_mut_with(&targets, |to, from| *to = from / scale);
         let squares = self::squares(crate::validate::row_major(&scaled));
-        Ok(Some(Self { targets: scaled.into(), scale, squares }))
+        Ok(Some(Self { targets: scaled.into(), n_demos, scale, squares }))
     }
 
     fn matrix(&self) -> MatRef<'_, f64> {
@@ -194,7 +211,7 @@ impl<'a> ScaledTargets<'a> {
             }
         }
         if let Some(gram) = gram::Gram::of(wide, &mut |share| progress((1.0 + share) / 3.0))? {
-            let n_styles = styles.among(&gram.values, self.targets.nrows());
+            let n_styles = styles.among(&gram.values, self.n_demos);
             // With few demonstrations all vectors cost little, and give every singular value full accuracy.
             let kept = if k <= 64 { k } else { n_styles };
             if let Some(vectors) = gram.leading(n_styles, kept) {
@@ -223,7 +240,7 @@ impl<'a> ScaledTargets<'a> {
     /// orthonormal columns, `None` for the identity.
     fn of_triangle(&self, styles: Truncation, triangle: MatRef<f64>, frame: Option<MatRef<f64>>) -> Result<Factors> {
         let small_svd::Svd { sigma: values, v, .. } = small_svd::Svd::of(triangle);
-        let n_styles = styles.among(&values, self.targets.nrows());
+        let n_styles = styles.among(&values, self.n_demos);
         let v = v.subcols(0, n_styles);
         let vectors = frame.map_or_else(|| v.to_owned(), |frame| product(frame, v));
         let projection = self.project(vectors, n_styles, |_| ())?;
@@ -249,12 +266,7 @@ impl<'a> ScaledTargets<'a> {
             true => householder::orthonormal(product(targets, vectors.as_ref())).0,
             false => vectors,
         };
-        for mut style in styles.col_iter_mut() {
-            let peak = style.rb().iter().fold(0.0f64, |peak, &x| if x.abs() > peak.abs() { x } else { peak });
-            if peak < 0.0 {
-                style.rb_mut().iter_mut().for_each(|x| *x = -*x);
-            }
-        }
+        fix_signs(styles.as_mut());
         let n_vectors = styles.ncols();
         let mut basis_targets = zeros("basis_targets", (n_styles, columns))?;
         let mut part = vec![0.0; n_vectors * PANEL.min(columns)];
@@ -288,6 +300,30 @@ impl<'a> ScaledTargets<'a> {
             basis_targets,
         }
     }
+}
+
+/// Returns the styles S (M, J) for targets projected to F·V·Σ⁻¹ (M, J), orthonormal to full accuracy and with the signs of
+/// [`Factors`], and the signs (J,) by which they differ from the projections.
+pub(crate) fn orthonormal_styles(projected: Array2<f64>) -> (Array2<f64>, Vec<f64>) {
+    let columns = Mat::from_fn(projected.nrows(), projected.ncols(), |i, j| projected[[i, j]]);
+    drop(projected);
+    let (mut styles, r) = householder::orthonormal(columns);
+    let turned: Vec<bool> = (0..r.ncols()).map(|j| r[(j, j)] < 0.0).collect();
+    let fixed = fix_signs(styles.as_mut());
+    let signs = turned.iter().zip(fixed).map(|(turned, fixed)| if *turned == fixed { 1.0 } else { -1.0 });
+    (Array2::from_shape_fn((styles.nrows(), styles.ncols()), |(i, j)| styles[(i, j)]), signs.collect())
+}
+
+/// Changes the signs of columns so that their entries of largest magnitude are positive; returns which were changed.
+fn fix_signs(mut columns: MatMut<f64>) -> Vec<bool> {
+    let fix = |mut column: faer::ColMut<f64>| {
+        let peak = column.rb().iter().fold(0.0f64, |peak, &x| if x.abs() > peak.abs() { x } else { peak });
+        if peak < 0.0 {
+            column.rb_mut().iter_mut().for_each(|x| *x = -*x);
+        }
+        peak < 0.0
+    };
+    columns.rb_mut().col_iter_mut().map(fix).collect()
 }
 
 /// Returns the sum of squares.

@@ -15,7 +15,7 @@ fn of(targets: &Array2<f64>, styles: Truncation) -> Factors {
 
 /// Computes every factor to full accuracy.
 fn exact(targets: &Array2<f64>) -> Factors {
-    let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+    let scaled = ScaledTargets::of(targets.view(), targets.nrows()).unwrap().unwrap();
     scaled.exact(Truncation::Rank(targets.nrows().min(targets.ncols())), &mut go).unwrap()
 }
 
@@ -378,7 +378,7 @@ fn second_gram_pass_is_as_accurate_as_reflections() {
     ];
     for sigma in cases {
         let targets = matrix(sigma.len(), 3000, &sigma);
-        let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+        let scaled = ScaledTargets::of(targets.view(), targets.nrows()).unwrap().unwrap();
         let gram = Gram::of(scaled.wide(), &mut go).unwrap().unwrap();
         let Some(triangle) = gram.triangle(scaled.wide(), &mut go).unwrap() else {
             assert!(sigma[sigma.len() - 1] < 1e-8, "{sigma:?}");
@@ -400,7 +400,7 @@ fn second_gram_pass_is_as_accurate_as_reflections() {
 fn vanishing_rows_have_no_triangle_of_products() {
     let mut targets = matrix(6, 3000, &[1.0; 6]);
     targets.row_mut(2).fill(0.0);
-    let scaled = ScaledTargets::of(targets.view()).unwrap().unwrap();
+    let scaled = ScaledTargets::of(targets.view(), targets.nrows()).unwrap().unwrap();
     let gram = Gram::of(scaled.wide(), &mut go).unwrap().unwrap();
     assert!(gram.triangle(scaled.wide(), &mut go).unwrap().is_none());
     check(&targets, &of(&targets, Truncation::Rank(6)));

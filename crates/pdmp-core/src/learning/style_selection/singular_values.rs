@@ -13,12 +13,12 @@ use crate::context::ContextColumn;
 use crate::demonstration::{Demonstration, Sampling};
 use crate::dynamics::transport::Transport;
 use crate::error::Result;
-use crate::learning::alignment::{Aligned, Alignment};
+use crate::learning::alignment::Alignment;
 use crate::learning::constants::Constants;
 use crate::learning::factorization::{Factors, Truncation};
 use crate::learning::targets::Targets;
 use crate::numerics::orthonormal_span::OrthonormalSpan;
-use crate::numerics::smoothing_spline::Smoothing;
+use crate::numerics::smoothing_spline::{Noise, Smoothing};
 use crate::numerics::statistics::pseudo_random;
 use crate::numerics::threads::Threads;
 
@@ -43,31 +43,43 @@ const SIGNIFICANCE: f64 = 0.01;
 /// Different contexts per coefficient from which the squares of numbers are among the regressors.
 const CONTEXTS_PER_SQUARE: usize = 4;
 
+/// Quantities of the demonstrations on which the noise in their targets depends.
+pub(crate) struct Recorded<'a> {
+    pub(crate) noise: &'a Noise,
+    /// Durations (M,) in seconds.
+    pub(crate) durations: &'a [f64],
+    /// Numbers of recorded samples (M,).
+    pub(crate) n_recorded: &'a [usize],
+    /// Number of samples C after alignment.
+    pub(crate) n_samples: usize,
+}
+
 /// Returns the largest singular value that measurement noise causes in the targets, with a margin; 0 without noise.
 ///
 /// If P rows of noise have the largest singular value ν and the root mean square row norm t, then M rows of the same
 /// distribution have t + (ν − t)√(M/P) on average (Gordon's inequality, used as an equation).
 pub(crate) fn noise_limit(
-    aligned: &Aligned,
+    recorded: &Recorded,
     constants: &Constants,
     transport: &Transport,
     dof_scale: &[f64],
     threads: Threads,
 ) -> Result<f64> {
-    let Some(highest) = aligned.noise.cut_offs().iter().flatten().copied().reduce(f64::max) else { return Ok(0.0) };
-    let (n_demos, durations) = (aligned.n_demos(), aligned.durations());
+    let Recorded { noise: measured, durations, n_recorded, n_samples: n_aligned } = *recorded;
+    let Some(highest) = measured.cut_offs().iter().flatten().copied().reduce(f64::max) else { return Ok(0.0) };
+    let n_demos = durations.len();
     let kind = constants.canonical.kind();
     let n_rows = n_demos.min(MAX_ROWS);
     // Sums of many random signs are normally distributed.
     let mut random = 0;
     let noise = |row: usize| {
         let m = row * n_demos / n_rows;
-        let recorded = aligned.demo(m).n_samples();
+        let recorded = n_recorded[m];
         let sufficient = (SAMPLES_PER_PERIOD * highest * durations[m]).ceil() as usize;
         let n = sufficient.max(MIN_SAMPLES).min(recorded);
         // White noise of the same power density at a lower sampling rate.
         let ratio = (n as f64 / recorded as f64).sqrt();
-        let size: Vec<f64> = aligned.noise.levels().iter().map(|level| level * ratio).collect();
+        let size: Vec<f64> = measured.levels().iter().map(|level| level * ratio).collect();
         let position =
             Array2::from_shape_fn((n, size.len()), |(_, d)| size[d].copysign(pseudo_random(&mut random) as f64));
         Demonstration::new(position, Sampling::Uniform { dt: durations[m] / kind.steps(n) as f64 })
@@ -84,7 +96,7 @@ pub(crate) fn noise_limit(
         vectors: Vec::new(),
     };
     let mut rows = alignment.align(&noise, threads)?;
-    rows.noise = aligned.noise.clone();
+    rows.noise = measured.clone();
     let mut targets = Targets::of(&rows, constants.attractor, constants.canonical, threads, &mut |_| Ok(()))?;
     targets.carry(transport, constants.attractor, constants.canonical);
     targets.scale(dof_scale);
@@ -93,35 +105,35 @@ pub(crate) fn noise_limit(
     let norm = (squares / n_rows as f64).sqrt();
     let growth = (n_demos as f64 / n_rows as f64).sqrt();
     let largest = norm + (factors.singular_values[0] - norm) * growth;
-    let density = aligned.n_samples as f64 / rows.n_samples as f64;
+    let density = n_aligned as f64 / rows.n_samples as f64;
     Ok(MARGIN * largest * density.sqrt())
 }
 
 /// Returns the systematic factors of the targets, including those that `contexts` explain.
+///
+/// `targets` may be any matrix A with AᵀA = FᵀF for the targets F of `n_demos` demonstrations, with regressors of the same
+/// inner products with its rows.
 pub(crate) fn systematic(
     targets: ArrayView2<f64>,
+    n_demos: usize,
     noise: f64,
-    contexts: Option<&(Vec<ContextColumn>, Array2<f64>)>,
+    regressors: Option<&OrthonormalSpan>,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Factors> {
     let count = Truncation::AboveNoise { noise, share: SHARE };
-    let Some((columns, numbers)) = contexts else { return Factors::of(targets, count, progress) };
-    let all = Factors::of(targets, Truncation::AboveNoise { noise, share: 1.0 }, progress)?;
-    let explained = explained(columns, numbers, &all.styles);
-    let n_styles = count.among(&all.singular_values, targets.nrows()).max(explained);
+    let Some(regressors) = regressors else { return Factors::of_compressed(targets, n_demos, count, progress) };
+    let all = Factors::of_compressed(targets, n_demos, Truncation::AboveNoise { noise, share: 1.0 }, progress)?;
+    let explained = explained(regressors, &all.styles, n_demos);
+    let n_styles = count.among(&all.singular_values, n_demos).max(explained);
     Ok(all.leading(n_styles))
 }
 
-/// Returns the number of leading styles (M, J) up to the last one that contexts explain significantly.
-///
-/// Each style is regressed on the numbers of the contexts, their squares where there are enough contexts, and indicators
-/// of their labels, and tested by an F-test.
-fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<f64>) -> usize {
-    let (n_demos, n_styles) = styles.dim();
+/// Returns the span of the regressors of contexts (M, Q), of which the first is constant: the numbers of the contexts, their
+/// squares where there are enough contexts, and indicators of their labels.
+pub(crate) fn regressors(columns: &[ContextColumn], contexts: &Array2<f64>) -> OrthonormalSpan {
     let numbers = || columns.iter().zip(contexts.columns()).filter(|(column, _)| **column == ContextColumn::Number);
-    // The first regressor is constant.
     let mut span = OrthonormalSpan::default();
-    span.add(ArrayView1::from(&vec![1.0; n_demos]));
+    span.add(ArrayView1::from(&vec![1.0; contexts.nrows()]));
     for (column, values) in columns.iter().zip(contexts.columns()) {
         match column {
             ContextColumn::Number => span.add(values),
@@ -130,18 +142,32 @@ fn explained(columns: &[ContextColumn], contexts: &Array2<f64>, styles: &Array2<
             }
         }
     }
-    if crate::context::group_equal_contexts(contexts).len() >= CONTEXTS_PER_SQUARE * (2 * numbers().count() + 1) {
+    if squares_are_regressors(columns, contexts) {
         for (_, values) in numbers() {
             let centre = values.mean().unwrap_or(0.0);
             span.add(values.map(|value| (value - centre).powi(2)).view());
         }
     }
+    span
+}
+
+/// Returns whether there are enough different contexts (M, Q) for the squares of their numbers.
+pub(crate) fn squares_are_regressors(columns: &[ContextColumn], contexts: &Array2<f64>) -> bool {
+    let n_numbers = columns.iter().filter(|column| **column == ContextColumn::Number).count();
+    crate::context::group_equal_contexts(contexts).len() >= CONTEXTS_PER_SQUARE * (2 * n_numbers + 1)
+}
+
+/// Returns the number of leading styles, the columns of a matrix, up to the last one that the contexts explain significantly.
+///
+/// Each style is regressed on the span of the regressors, and tested by an F-test.
+fn explained(span: &OrthonormalSpan, styles: &Array2<f64>, n_demos: usize) -> usize {
+    let n_styles = styles.ncols();
     let n_regressors = span.0.len() - 1;
     let constant = OrthonormalSpan(span.0[..1].to_vec());
     let degrees_of_freedom = n_demos.saturating_sub(n_regressors + 1);
     let Ok(distribution) = FisherSnedecor::new(n_regressors as f64, degrees_of_freedom as f64) else { return 1 };
     let is_explained = |j: &usize| {
-        let [total, residual] = [&constant, &span].map(|span| {
+        let [total, residual] = [&constant, span].map(|span| {
             let rest = span.rest(styles.column(*j));
             rest.dot(&rest)
         });

@@ -119,27 +119,7 @@ impl Model {
     /// # Errors
     /// A path that cannot be written, or whose folder does not exist.
     pub fn save(&self, path: &Path) -> Result<()> {
-        let bytes = self.to_bytes()?;
-        let failed = |source| Error::Io { path: path.to_path_buf(), source };
-        let target = fs::canonicalize(path)
-            // The target of a link need not exist.
-            .or_else(|_| fs::read_link(path).map(|to| path.parent().unwrap_or(Path::new("")).join(to)))
-            .unwrap_or_else(|_| path.to_path_buf());
-        if fs::metadata(&target).is_ok_and(|existing| !existing.is_file() && !existing.is_dir()) {
-            return fs::write(&target, &bytes).map_err(failed);
-        }
-        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() {
-            let source = io::Error::new(io::ErrorKind::NotFound, "no such folder; create it first");
-            return Err(Error::Io { path: folder.to_path_buf(), source });
-        }
-        let (draft, mut file) = Draft::create(folder).map_err(failed)?;
-        file.write_all(&bytes).map_err(failed)?;
-        file.sync_all().map_err(failed)?;
-        if let Ok(existing) = fs::metadata(&target) {
-            file.set_permissions(existing.permissions()).map_err(failed)?;
-        }
-        draft.persist(&target).map_err(failed)
+        write_atomically(path, &self.to_bytes()?)
     }
 
     /// Reads a model file.
@@ -162,28 +142,57 @@ impl Model {
     /// # Errors
     /// A path that cannot be read, or a file that is damaged, not a model, or of another version.
     pub fn load(path: &Path) -> Result<Self> {
-        let failed = |source| Error::Io { path: path.to_path_buf(), source };
-        let with_path = |error| match error {
-            Error::File(reason) => unreadable(format!("{}: {reason}", path.display())),
-            other => other,
-        };
-        let mut file = fs::File::open(path).map_err(failed)?;
-        let mut bytes = Vec::new();
-        // The length of the header comes first: a large file of another format is rejected without reading it.
-        Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(failed)?;
-        check_size(&bytes).map_err(with_path)?;
-        file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(failed)?;
-        Self::from_bytes(&bytes).map_err(with_path)
+        read_file(path, Self::from_bytes)
     }
 }
 
+/// Writes a file atomically: an interrupted call leaves an existing file unchanged.
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let failed = |source| Error::Io { path: path.to_path_buf(), source };
+    let target = fs::canonicalize(path)
+        // The target of a link need not exist.
+        .or_else(|_| fs::read_link(path).map(|to| path.parent().unwrap_or(Path::new("")).join(to)))
+        .unwrap_or_else(|_| path.to_path_buf());
+    if fs::metadata(&target).is_ok_and(|existing| !existing.is_file() && !existing.is_dir()) {
+        return fs::write(&target, bytes).map_err(failed);
+    }
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        let source = io::Error::new(io::ErrorKind::NotFound, "no such folder; create it first");
+        return Err(Error::Io { path: folder.to_path_buf(), source });
+    }
+    let (draft, mut file) = Draft::create(folder).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    file.sync_all().map_err(failed)?;
+    if let Ok(existing) = fs::metadata(&target) {
+        file.set_permissions(existing.permissions()).map_err(failed)?;
+    }
+    draft.persist(&target).map_err(failed)
+}
+
+/// Reads a safetensors file, and converts its bytes.
+pub(crate) fn read_file<T>(path: &Path, convert: impl FnOnce(&[u8]) -> Result<T>) -> Result<T> {
+    let failed = |source| Error::Io { path: path.to_path_buf(), source };
+    let with_path = |error| match error {
+        Error::File(reason) => unreadable(format!("{}: {reason}", path.display())),
+        other => other,
+    };
+    let mut file = fs::File::open(path).map_err(failed)?;
+    let mut bytes = Vec::new();
+    // The length of the header comes first: a large file of another format is rejected without reading it.
+    Read::by_ref(&mut file).take(8).read_to_end(&mut bytes).map_err(failed)?;
+    check_size(&bytes).map_err(with_path)?;
+    file.take(MAX_FILE_SIZE).read_to_end(&mut bytes).map_err(failed)?;
+    convert(&bytes).map_err(with_path)
+}
+
 /// Returns the error of a file that is damaged, not a model, or of another version.
-fn unreadable(reason: impl Display) -> Error {
+pub(crate) fn unreadable(reason: impl Display) -> Error {
     Error::File(reason.to_string())
 }
 
 /// Checks a property of the contents of a file.
-fn ensure(valid: bool, reason: &str) -> Result<()> {
+pub(crate) fn ensure(valid: bool, reason: &str) -> Result<()> {
     if valid { Ok(()) } else { Err(unreadable(reason)) }
 }
 

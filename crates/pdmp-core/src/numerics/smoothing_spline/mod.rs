@@ -33,7 +33,7 @@ use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
 use crate::validate::{check_positive, row_major, row_major_mut};
 pub use noise::Noise;
-pub(crate) use noise::{MIN_DECIMATED, pooled};
+pub(crate) use noise::{MIN_DECIMATED, pool_stride, pooled};
 use roughness::Roughness;
 
 /// Treatment of measurement noise before demonstrations are differentiated.

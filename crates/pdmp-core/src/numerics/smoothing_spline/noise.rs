@@ -154,10 +154,20 @@ impl Noise {
 }
 
 /// Returns the indices of the recordings, evenly spaced among `n`, from which the common noise is estimated.
+///
+/// They are multiples of [`pool_stride`], so that recordings of unknown number can be selected as they arrive.
 pub(crate) fn pooled(n: usize) -> impl Iterator<Item = usize> {
-    let n_pooled = n.min(MAX_POOLED);
-    (0..n_pooled).map(move |p| p * n / n_pooled)
+    let (n_pooled, stride) = (n.min(MAX_POOLED), pool_stride(n));
+    (0..n_pooled).map(move |p| p * n / n_pooled / stride * stride)
 }
+
+/// Returns a power of two of whose multiples there are at most 512 below `n`; it does not decrease with `n`.
+pub(crate) fn pool_stride(n: usize) -> usize {
+    1 << (n / MIN_CANDIDATES).max(1).ilog2()
+}
+
+/// Least number of candidates for the pool, of more recordings: the pool is even to a tenth of its spacing.
+const MIN_CANDIDATES: usize = 256;
 
 /// Returns the DoFs whose noise may not be negligible.
 ///

@@ -29,6 +29,7 @@ use crate::validate::row_major;
 
 pub use cycle_ends::cycle_ends;
 pub use turns::unwound;
+pub(crate) use turns::{REFERENCE_SAMPLES, reference, unwound_from};
 
 /// Minimum number of samples for an estimate of the usual step of a degree of freedom.
 const MIN_SAMPLES: usize = 10;

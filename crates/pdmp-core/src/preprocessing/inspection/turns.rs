@@ -7,6 +7,8 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use super::{Finding, Survey};
+use ndarray::Array2;
+
 use crate::demonstration::{Demonstration, turn_of};
 use crate::numerics::statistics::{extremes, range};
 
@@ -109,6 +111,30 @@ pub fn unwound(demos: &[Demonstration]) -> Cow<'_, [Demonstration]> {
     for d in 0..demos.first().map_or(0, Demonstration::n_coordinates) {
         for (m, turns, turn, mended) in offsets(&all, d) {
             if mended {
+                unwound.to_mut()[m].shift(d, -turns * turn);
+            }
+        }
+    }
+    unwound
+}
+
+/// Number of samples of a [`reference`].
+pub(crate) const REFERENCE_SAMPLES: usize = N_COMPARED;
+
+/// Returns the samples of a demonstration (9, D) from which the whole turns of others are counted.
+pub(crate) fn reference(demo: &Demonstration) -> Array2<f64> {
+    let position = demo.position();
+    let sample = |k: usize| k * (demo.n_samples() - 1) / (N_COMPARED - 1);
+    Array2::from_shape_fn((N_COMPARED, demo.n_coordinates()), |(k, d)| position[[sample(k), d]])
+}
+
+/// Subtracts the whole turns by which angles are offset from those of a reference with units.
+pub(crate) fn unwound_from<'a>(from: &Demonstration, demos: &'a [Demonstration]) -> Cow<'a, [Demonstration]> {
+    let mut unwound = Cow::Borrowed(demos);
+    for d in 0..from.n_coordinates() {
+        let Unit::Angle(turn) = unit(from, d) else { continue };
+        for (m, demo) in demos.iter().enumerate() {
+            if let Some(turns) = offset(demo, from, d, turn, MAX_DEVIATION).filter(|turns| *turns != 0.0) {
                 unwound.to_mut()[m].shift(d, -turns * turn);
             }
         }
