@@ -312,7 +312,7 @@ impl Controllers {
         mut tick: impl FnMut(&mut Controller, usize) -> Result<Status>,
     ) -> Result<()> {
         let Motions { position, velocity, acceleration } = motions;
-        let mut rows = Rows { position: position, velocity: velocity, acceleration: acceleration };
+        let mut rows = Rows { position, velocity, acceleration };
         self.ending.clear();
         let first = &self.controllers[0];
         self.steady.step(first.primitive(), first.steady_tick(), mask, &mut rows, &mut self.ending);
