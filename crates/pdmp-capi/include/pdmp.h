@@ -16,7 +16,7 @@
 //   text and memory in bytes. All numbers are double precision, all strings UTF-8.
 // - Threads: any number of threads may use a model; one thread at a time may use a controller.
 // - Real time: pdmp_controller_step, _update, _set_..., _release, _copy, _read, _limited, _progress
-//   and _error neither allocate nor lock.
+//   and _error, pdmp_absolute_relative and pdmp_left_right neither allocate nor lock.
 // - ABI: structs may grow between minor versions before 1.0; recompile for each.
 //
 // Link with -lpdmp; the static library also needs -lpthread -ldl -lm. pdmp.hpp is a C++17 wrapper.

@@ -117,6 +117,7 @@ impl pdmp_conditions {
             segment_durations: None,
             // SAFETY: the caller guarantees that the pointer is NULL or valid.
             phase: unsafe { self.phase.as_ref() }.copied(),
+            forcing: None,
         })
     }
 

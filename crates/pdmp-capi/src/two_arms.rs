@@ -4,7 +4,6 @@ use pdmp_core::Result;
 use pdmp_core::motion::{Pose, TwoArms};
 
 use crate::buffers::{pdmp_buffer, pdmp_text, pdmp_vector};
-use crate::fault::Fault;
 use crate::guard::guard_with_text;
 use crate::status::pdmp_status;
 
@@ -68,7 +67,7 @@ unsafe fn convert(
         let mut poses = [[0.0; 7]; 2];
         for ((name, numbers), pose) in inputs.into_iter().zip(&mut poses) {
             // SAFETY: this function has the same contract.
-            pose.copy_from_slice(unsafe { numbers.require(name, pose.len(), "component of a pose") }?);
+            pose.copy_from_slice(unsafe { numbers.require(name, 7, "component of a pose") }?);
         }
         // SAFETY: as above.
         let arms = match unsafe { reference.get("reference", 4, "component of a quaternion") }? {

@@ -523,6 +523,7 @@ fn conditions_of_demonstrations_and_contexts_are_those_of_rust() {
             segment_durations: None,
             // SAFETY: as above.
             phase: unsafe { c.phase.as_ref() }.copied(),
+            forcing: None,
         };
         // Conditions in C have a time constant in place of durations of segments.
         let by_tau = |conditions: pdmp_core::Conditions| {
