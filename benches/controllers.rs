@@ -105,7 +105,9 @@ fn controllers(criterion: &mut Criterion) {
             .map(|_| Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).expect("one"))
             .collect();
         for (b, controller) in alone.iter_mut().enumerate() {
-            (0..warm_up(b, spread)).for_each(|_| drop(controller.step().expect("a tick")));
+            (0..warm_up(b, spread)).for_each(|_| {
+                controller.step().expect("a tick");
+            });
         }
         let alone = Alone { controllers: alone, rows: rows() };
         for (load, goals) in [("settled", None), ("to new goals", Some(&goals))] {

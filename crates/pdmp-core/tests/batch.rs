@@ -94,6 +94,7 @@ proptest! {
                 goal_velocity: goal_velocities.clone(),
                 amplitude: Some(amplitude).filter(|_| !discrete),
                 tau,
+                forcing: None,
             };
             let duration = length * factor * model.duration();
             let made = all(&conditions, model, grid(dt, duration));
@@ -107,8 +108,7 @@ proptest! {
                     goal_velocity: row(&goal_velocities, b),
                     amplitude: conditions.amplitude,
                     tau,
-                    segment_durations: None,
-                    phase: None,
+                    ..Conditions::default()
                 };
                 let mut controller = Controller::new(model.primitive(), dt, &one, Some(0.0)).unwrap();
                 let mut stepped = [(); 3].map(|()| Array2::zeros((made.position.len_of(Axis(1)), n)));
@@ -246,8 +246,7 @@ fn jacobians_are_differences_of_rollouts() {
                 goal_velocity,
                 amplitude: (!discrete).then_some(0.7),
                 tau: Some(1.4 * model.tau()),
-                segment_durations: None,
-                phase: None,
+                ..Conditions::default()
             };
             let rollout = |conditions: &Conditions| rollout(model.primitive(), conditions, grid(0.01, 1.5)).unwrap();
             let centre = if discrete { WithRespectTo::Goal } else { WithRespectTo::Anchor };

@@ -97,6 +97,7 @@ proptest! {
                 goal_velocity: (discrete && goal_velocity).then(|| vectors(n_dofs, seed + 4)),
                 amplitude: (!discrete).then_some(amplitude),
                 tau: Some(factor * model.tau()),
+                ..BatchConditions::default()
             };
             let grid = grid(0.01, 0.01 * (samples - 1) as f64);
             let variables = variables(model.kind(), &conditions, orders);
