@@ -1,8 +1,31 @@
-//! Inference of whole movements from a part of them: via-points.
+//! Inference of a movement from a part of it: points that it passes, or observations of its first part.
+//!
+//! At a given clock u a movement is linear in its parameters θ = (style, goal, start), or (style, anchor), y(u) = Φ(u)θ.
+//! Via-points are therefore linear constraints ([`through`]). The duration and the time of the start enter through u alone: a
+//! [`Recogniser`] keeps one linear-Gaussian estimate of θ for each hypothesis of duration and start, and weighs the hypotheses
+//! by their likelihood.
 
+mod calibration;
 mod constraints;
+mod continuation;
+mod estimate;
+mod evidence;
 mod linear_path;
+mod movement_table;
+mod noise_filter;
 mod passage;
+pub(crate) mod prior;
+pub(crate) mod recogniser;
 mod via_points;
 
+pub(crate) use calibration::SHARES;
+pub use calibration::{Calibration, Factors};
+pub use continuation::Continuation;
+pub use estimate::Estimate;
+pub(crate) use movement_table::responses;
+pub use prior::{Prior, Settings};
+pub use recogniser::{Recogniser, Timing};
 pub use via_points::{At, Passage, PassageOptions, ViaPoint, through};
+
+#[cfg(all(test, feature = "learning"))]
+mod tests;

@@ -1,0 +1,207 @@
+//! Prior distribution of the parameters of a movement.
+
+use ndarray::{Array2, ArrayView2, Axis};
+
+use super::calibration::Calibration;
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::validate::{check_finite, check_length, check_matrix, check_range};
+
+/// Smallest number of demonstrations of a prior.
+pub(crate) const MIN_DEMOS: usize = 3;
+/// Smallest standard deviation of the logarithm of the duration: recordings of one length have none.
+pub(crate) const MIN_LOG_DEVIATION: f64 = 0.003;
+/// Share of the covariance of the demonstrations that its diagonal replaces.
+const SHRINKAGE: f64 = 0.1;
+
+/// Settings of a prior, chosen by cross-validation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Bandwidth c of the kernel on each demonstration, in (0, 1], relative to the deviations of the demonstrations.
+    pub bandwidth: f64,
+    /// Exponent β of the likelihood, in (0, 1].
+    pub tempering: f64,
+    /// Correlation time of the residual, in seconds.
+    pub correlation_time: f64,
+}
+
+/// Prior distribution of style, goal, start or anchor, and duration, from the demonstrations of a model.
+///
+/// A mixture of Gaussian kernels, one on each of the M demonstrations, of covariance c²Σ about centres drawn towards the
+/// mean so that the mixture keeps mean and covariance of the demonstrations (M. West, J. R. Stat. Soc. B 55, 1993),
+///
+/// ```text
+/// p(θ, log T) = 1/M Σₘ N(μ + √(1−c²)(θₘ − μ), c²Σ).
+/// ```
+///
+/// A movement deviates from y = Φ(u)θ by a residual of standard deviation σ_d: an Ornstein-Uhlenbeck process, which stands
+/// for the shapes that the styles lack, plus white noise. The exponent β of the likelihood limits the confidence of a
+/// model that is not exact (P. Grünwald, T. van Ommen, Bayesian Analysis 12, 2017, doi:10.1214/17-BA1085).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    kind: Kind,
+    n_styles: usize,
+    parameters: Array2<f64>,
+    log_durations: Vec<f64>,
+    residual: Vec<f64>,
+    settings: Settings,
+    calibration: Calibration,
+}
+
+/// Moments of the demonstrations.
+pub(crate) struct Moments {
+    /// Mean of the parameters (K,).
+    pub(crate) mean: Vec<f64>,
+    /// Covariance (K, K) of the parameters given the duration.
+    pub(crate) covariance: Array2<f64>,
+    /// Mean of the logarithms of the durations.
+    pub(crate) log_mean: f64,
+    /// Their standard deviation.
+    pub(crate) log_deviation: f64,
+    /// Regression (K,) of the parameters on the logarithm of the duration.
+    pub(crate) slope: Vec<f64>,
+}
+
+impl Prior {
+    /// Creates a prior from the parameters (M, K) of demonstrations, the logarithms (M,) of their durations in seconds,
+    /// and the standard deviations (D,) of the residual.
+    ///
+    /// The parameters are style (J,), goal (D,) and start (D,), or style and anchor (D,) of a rhythmic movement.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use pdmp_core::Kind;
+    /// use pdmp_core::inference::{Calibration, Prior, Settings};
+    ///
+    /// let settings = Settings { bandwidth: 0.5, tempering: 1.0, correlation_time: 0.1 };
+    /// let parameters = array![[0.1, 1.0, 0.0], [0.2, 1.1, 0.0], [0.4, 1.3, 0.1]];
+    /// let durations = vec![0.0, 0.1, 0.2];
+    /// let prior = Prior::new(Kind::Discrete, parameters, durations, vec![0.01], settings, Calibration::NONE)?;
+    /// assert_eq!((prior.n_demos(), prior.n_styles()), (3, 1));
+    /// # Ok::<(), pdmp_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Fewer than three demonstrations, lengths that do not match, numbers that are not finite, or settings out of range.
+    pub fn new(
+        kind: Kind,
+        parameters: Array2<f64>,
+        log_durations: Vec<f64>,
+        residual: Vec<f64>,
+        settings: Settings,
+        calibration: Calibration,
+    ) -> Result<Self> {
+        check_matrix("parameters", parameters.view())?;
+        check_length("log_durations", log_durations.len(), parameters.nrows(), "demonstration")?;
+        check_finite("log_durations", &log_durations)?;
+        check_finite("residual", &residual)?;
+        if parameters.nrows() < MIN_DEMOS {
+            let problem = "of fewer than three demonstrations: a prior needs at least three";
+            return Err(Error::Argument { name: "parameters", problem });
+        }
+        let n_positions = frame_size(kind) * residual.len();
+        if residual.is_empty() || parameters.ncols() <= n_positions {
+            let (expected, found) = (n_positions + 1, parameters.ncols());
+            return Err(Error::Length {
+                name: "parameters",
+                expected,
+                found,
+                per: "style, and goal and start of each DoF",
+            });
+        }
+        let positive = "must be positive and finite";
+        residual.iter().try_for_each(|&sd| check_range("residual", sd, sd > 0.0, positive))?;
+        let n_styles = parameters.ncols() - n_positions;
+        Self { kind, n_styles, parameters, log_durations, residual, settings, calibration }.with_settings(settings)
+    }
+
+    /// Returns the prior with other settings.
+    ///
+    /// # Errors
+    /// A bandwidth or exponent outside (0, 1], or a correlation time that is not positive.
+    pub(crate) fn with_settings(self, settings: Settings) -> Result<Self> {
+        let share = |value: f64| value > 0.0 && value <= 1.0;
+        let Settings { bandwidth, tempering, correlation_time } = settings;
+        check_range("bandwidth", bandwidth, share(bandwidth), "must lie in (0, 1]")?;
+        check_range("tempering", tempering, share(tempering), "must lie in (0, 1]")?;
+        let valid = (1e-9..=1e9).contains(&correlation_time);
+        check_range("correlation_time", correlation_time, valid, "seconds must lie between 1e-9 and 1e9")?;
+        Ok(Self { settings, ..self })
+    }
+
+    /// Returns the prior with another calibration.
+    pub(crate) fn with_calibration(self, calibration: Calibration) -> Self {
+        Self { calibration, ..self }
+    }
+
+    /// Returns the kind of movement.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Returns the number of demonstrations M.
+    pub fn n_demos(&self) -> usize {
+        self.parameters.nrows()
+    }
+
+    /// Returns the style dimension J.
+    pub fn n_styles(&self) -> usize {
+        self.n_styles
+    }
+
+    /// Returns the parameters (M, K) of the demonstrations.
+    pub fn parameters(&self) -> ArrayView2<'_, f64> {
+        self.parameters.view()
+    }
+
+    /// Returns the logarithms (M,) of the durations in seconds.
+    pub fn log_durations(&self) -> &[f64] {
+        &self.log_durations
+    }
+
+    /// Returns the standard deviations σ (D,) of the residual.
+    pub fn residual(&self) -> &[f64] {
+        &self.residual
+    }
+
+    /// Returns the settings.
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// Returns the factors of the bands.
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Computes the moments of the demonstrations. The covariance is shrunk towards its diagonal (O. Ledoit, M. Wolf,
+    /// J. Multivar. Anal. 88, 2004), since it is singular with fewer demonstrations than parameters.
+    pub(crate) fn moments(&self) -> Moments {
+        let n = self.n_demos() as f64;
+        let mean = self.parameters.sum_axis(Axis(0)) / n;
+        let log_mean = self.log_durations.iter().sum::<f64>() / n;
+        let deviations = &self.parameters - &mean;
+        let logs: ndarray::Array1<f64> = self.log_durations.iter().map(|log| log - log_mean).collect();
+        let log_variance = logs.dot(&logs) / n + MIN_LOG_DEVIATION * MIN_LOG_DEVIATION;
+        let slope = deviations.t().dot(&logs) * ((1.0 - SHRINKAGE) / n / log_variance);
+        let mut covariance = deviations.t().dot(&deviations) / n;
+        let diagonal = covariance.diag().to_owned();
+        // A parameter that does not vary keeps a small variance, so that the covariance is regular.
+        let least = 1e-9 * diagonal.sum() / diagonal.len() as f64 + f64::MIN_POSITIVE.sqrt();
+        covariance *= 1.0 - SHRINKAGE;
+        covariance.diag_mut().scaled_add(SHRINKAGE, &diagonal);
+        covariance.diag_mut().iter_mut().for_each(|variance| *variance += least);
+        for ((i, j), entry) in covariance.indexed_iter_mut() {
+            *entry -= slope[i] * slope[j] * log_variance;
+        }
+        Moments { mean: mean.to_vec(), covariance, log_mean, log_deviation: log_variance.sqrt(), slope: slope.to_vec() }
+    }
+}
+
+/// Returns the number of positions of each DoF among the parameters: goal and start, or the anchor.
+pub(crate) fn frame_size(kind: Kind) -> usize {
+    match kind {
+        Kind::Discrete => 2,
+        Kind::Rhythmic => 1,
+    }
+}

@@ -1,0 +1,352 @@
+//! Recognition of a movement while it is observed.
+
+use super::calibration::Factors;
+use super::estimate::{Estimate, MIN_WEIGHT};
+use super::evidence::{Belief, Kernels, Scratch};
+use super::movement_table::MovementTable;
+use super::noise_filter::NoiseFilter;
+use super::prior::{Moments, Prior, frame_size};
+use crate::error::{Error, Result};
+use crate::kind::Kind;
+use crate::model::Model;
+use crate::validate::{check_length, check_number, check_range};
+
+/// Hypotheses of the duration, where the start is known.
+const N_DURATIONS: usize = 64;
+/// Hypotheses of the duration, for each of the start or phase.
+const N_DURATIONS_OF_STARTS: usize = 16;
+/// Hypotheses of the start of a discrete movement.
+const N_STARTS: usize = 16;
+/// Hypotheses of the phase of a rhythmic movement.
+const N_PHASES: usize = 24;
+/// Deviations of the logarithm of the duration beyond the demonstrated range that hypotheses cover.
+const MARGIN: f64 = 1.0;
+
+/// Knowledge of the time of a movement.
+///
+/// ```
+/// use pdmp_core::inference::Timing;
+///
+/// assert_eq!(Timing::default().starts, [0.0, 0.0]);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timing {
+    /// Earliest and latest start of a discrete movement, in seconds from the first observation: a negative one is a
+    /// movement that was joined on its way. Until it starts, it rests. By default, it starts with the first observation.
+    /// A rhythmic movement is observed from an unknown phase.
+    pub starts: [f64; 2],
+    /// Duration or period in seconds, if it is known.
+    pub duration: Option<f64>,
+}
+
+/// Computations from the observations so far.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+enum Stage {
+    /// None.
+    Observed,
+    /// Means and weights of the hypotheses.
+    Weighed,
+    /// Covariances and the estimate.
+    Estimated,
+}
+
+/// Hypothesis of the time of a movement.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hypothesis {
+    /// Duration or period T, in seconds.
+    pub(crate) duration: f64,
+    /// Logarithm of the duration, less the mean of the demonstrations.
+    pub(crate) log: f64,
+    /// Start from the first observation, in durations.
+    pub(crate) start: f64,
+}
+
+impl Hypothesis {
+    /// Returns the fraction of the movement at a time from the first observation.
+    pub(crate) fn fraction(&self, time: f64) -> f64 {
+        time / self.duration - self.start
+    }
+}
+
+/// Filter that estimates the parameters of a movement while it is observed.
+///
+/// Each hypothesis of duration and start has the posterior of θ under the mixture of a [`Prior`], in closed form from the
+/// sums of outer products of whitened observations: the movement is linear in θ. An observation takes the same time and
+/// memory at any time, and does not allocate.
+///
+/// ```
+/// # use pdmp_core::{Demonstration, FitOptions, Kind, fit, rollout};
+/// # use pdmp_core::inference::{Recogniser, Timing};
+/// # use pdmp_core::learning::learn_prior;
+/// # use pdmp_core::motion::TimeGrid;
+/// # use pdmp_core::numerics::Threads;
+/// # fn main() -> pdmp_core::Result<()> {
+/// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+/// # // Each obstacle is passed twice.
+/// # let demos = [demos.clone(), demos].concat();
+/// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+/// let prior = learn_prior(&model, &demos, None, Threads::ONE)?;
+/// let mut recogniser = Recogniser::new(&model, &prior, Timing::default())?;
+/// // The first half of a movement is seen.
+/// let movement = rollout(model.primitive(), &model.conditions(&[1])?, TimeGrid { dt: 0.01, duration: None })?;
+/// let n = movement.time.len() / 2;
+/// for (&time, position) in movement.time.iter().zip(movement.position.rows()).take(n) {
+///     recogniser.update(time, &position.to_vec())?;
+/// }
+/// let (duration, seen) = (recogniser.estimate()?.duration, recogniser.estimate()?.fraction);
+/// assert!(seen > 0.2 && seen < 0.9);
+/// let rest = recogniser.continuation(&[duration])?;
+/// assert_eq!(rest.position.dim(), (1, model.n_dofs()));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Recogniser {
+    pub(crate) prior: Prior,
+    pub(crate) table: MovementTable,
+    kernels: Kernels,
+    pub(crate) hypotheses: Vec<Hypothesis>,
+    pub(crate) noise: NoiseFilter,
+    /// Estimate of the process of the residual for each hypothesis and DoF, linear in [x, 1] (w,).
+    pub(crate) processes: Vec<f64>,
+    /// Sum of the outer products of whitened rows of each hypothesis (q + 1, w), its lower triangle.
+    pub(crate) information: Vec<f64>,
+    pub(crate) beliefs: Vec<Belief>,
+    pub(crate) scratch: Scratch,
+    row: Vec<f64>,
+    /// Times of the first and the last observation, in seconds.
+    pub(crate) times: Option<[f64; 2]>,
+    /// Number of observed positions.
+    pub(crate) n_observed: usize,
+    stage: Stage,
+    pub(crate) estimate: Estimate,
+}
+
+impl Recogniser {
+    /// Creates the recogniser of a model with a prior of its parameters.
+    ///
+    /// # Errors
+    /// A prior of another model, a model with rotations or a time warp, or times that are not finite.
+    pub fn new(model: &Model, prior: &Prior, timing: Timing) -> Result<Self> {
+        Self::with_durations(model, prior, timing, N_DURATIONS)
+    }
+
+    /// Creates a recogniser as [`Self::new`] does, with a number of hypotheses of the duration.
+    pub(crate) fn with_durations(model: &Model, prior: &Prior, timing: Timing, n_durations: usize) -> Result<Self> {
+        let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
+        let same = prior.kind() == model.kind() && prior.residual().len() == model.n_dofs();
+        if !same || prior.parameters().ncols() != n_parameters {
+            let problem = "is of another model: its kind, styles or degrees of freedom differ";
+            return Err(Error::Argument { name: "prior", problem });
+        }
+        check_linear(model)?;
+        let moments = prior.moments();
+        let table = MovementTable::new(model.primitive(), prior, &moments)?;
+        let kernels = Kernels::new(prior, &moments, &table);
+        let hypotheses = hypotheses(prior, timing, &moments, n_durations)?;
+        let (n, q, width) = (hypotheses.len(), table.n_directions, table.width);
+        Ok(Self {
+            noise: NoiseFilter::new(prior.residual(), prior.settings().correlation_time),
+            processes: vec![0.0; n * model.n_dofs() * width],
+            information: vec![0.0; n * (q + 1) * width],
+            beliefs: vec![Belief::new(q); n],
+            scratch: Scratch::new(&kernels),
+            row: vec![0.0; width],
+            times: None,
+            n_observed: 0,
+            stage: Stage::Observed,
+            estimate: Estimate::new(prior),
+            prior: prior.clone(),
+            table,
+            kernels,
+            hypotheses,
+        })
+    }
+
+    /// Forgets all observations.
+    pub fn reset(&mut self) {
+        let Self { processes, information, .. } = self;
+        processes.iter_mut().chain(information).for_each(|value| *value = 0.0);
+        self.noise = NoiseFilter::new(self.prior.residual(), self.prior.settings().correlation_time);
+        (self.times, self.n_observed, self.stage) = (None, 0, Stage::Observed);
+    }
+
+    /// Returns the number of hypotheses.
+    pub fn n_hypotheses(&self) -> usize {
+        self.hypotheses.len()
+    }
+
+    /// Includes the positions (D,) at a time in seconds. A missing degree of freedom is NaN; the interval to the time
+    /// before is arbitrary. Does not allocate.
+    ///
+    /// # Errors
+    /// A time that is not after the one before, or a wrong number of positions, or an infinite one. The recogniser then
+    /// remains as it was.
+    pub fn update(&mut self, time: f64, position: &[f64]) -> Result<()> {
+        check_length("position", position.len(), self.prior.residual().len(), "DoF")?;
+        let observed = position.iter().enumerate().filter(|(_, y)| !y.is_nan());
+        observed.clone().try_for_each(|(d, &y)| check_number("position", d, y))?;
+        check_number("time", 0, time)?;
+        let (first, interval) = match self.times {
+            None => (time, 0.0),
+            Some([first, last]) => {
+                check_range(
+                    "time",
+                    time,
+                    time > last,
+                    "must be after the time of the observation before; reset to begin again",
+                )?;
+                (first, time - last)
+            }
+        };
+        self.n_observed += observed.count();
+        self.times = Some([first, time]);
+        self.stage = Stage::Observed;
+        self.noise.advance(interval, position);
+        let (q, width) = (self.table.n_directions, self.table.width);
+        let processes = self.processes.chunks_exact_mut(position.len() * width);
+        let information = self.information.chunks_exact_mut((q + 1) * width);
+        for ((hypothesis, processes), information) in self.hypotheses.iter().zip(processes).zip(information) {
+            let fraction = hypothesis.fraction(time - first);
+            for (d, process) in processes.chunks_exact_mut(width).enumerate() {
+                process.iter_mut().for_each(|value| *value *= self.noise.decay);
+                let Some((gain, scale)) = self.noise.gains[d] else { continue };
+                let row = &mut self.row[..width];
+                self.table.row(fraction, d, row);
+                row[q] = position[d] - row[q];
+                for (value, process) in row.iter_mut().zip(process) {
+                    let innovation = *value - *process;
+                    *process += gain * innovation;
+                    *value = scale * innovation;
+                }
+                for (i, sums) in information.chunks_exact_mut(width).enumerate() {
+                    let (sums, row, factor) = (sums.as_chunks_mut::<4>().0, row.as_chunks::<4>().0, row[i]);
+                    // The lower triangle, in whole registers.
+                    for (sums, values) in sums.iter_mut().zip(row).take(i / 4 + 1) {
+                        (0..4).for_each(|k| sums[k] += factor * values[k]);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the estimate from all observations so far. Does not allocate.
+    ///
+    /// # Errors
+    /// No observation yet, or observations so far from the model that their likelihood underflows.
+    pub fn estimate(&mut self) -> Result<&Estimate> {
+        if self.stage < Stage::Estimated {
+            self.weigh()?;
+            let size = (self.table.n_directions + 1) * self.table.width;
+            let information = self.information.chunks_exact(size);
+            for ((belief, information), hypothesis) in self.beliefs.iter_mut().zip(information).zip(&self.hypotheses) {
+                if belief.weight > MIN_WEIGHT {
+                    belief.spread(information, hypothesis.log, &self.kernels, &mut self.scratch);
+                }
+            }
+            self.summarise();
+            self.stage = Stage::Estimated;
+        }
+        Ok(&self.estimate)
+    }
+
+    /// Computes mean and weight of each hypothesis.
+    ///
+    /// # Errors
+    /// As for [`Self::estimate`].
+    pub(crate) fn weigh(&mut self) -> Result<()> {
+        if self.stage >= Stage::Weighed {
+            return Ok(());
+        }
+        if self.n_observed == 0 {
+            let problem = "has none: call update with a position first";
+            return Err(Error::Argument { name: "observations", problem });
+        }
+        let size = (self.table.n_directions + 1) * self.table.width;
+        let information = self.information.chunks_exact(size);
+        for ((belief, information), hypothesis) in self.beliefs.iter_mut().zip(information).zip(&self.hypotheses) {
+            belief.update(information, hypothesis.log, &self.kernels, &mut self.scratch);
+        }
+        let largest = self.beliefs.iter().map(|belief| belief.weight).fold(f64::NEG_INFINITY, f64::max);
+        if !largest.is_finite() {
+            let problem = "are too far from the demonstrations: check their units";
+            return Err(Error::Argument { name: "observations", problem });
+        }
+        self.beliefs.iter_mut().for_each(|belief| belief.weight = (belief.weight - largest).exp());
+        let sum: f64 = self.beliefs.iter().map(|belief| belief.weight).sum();
+        self.beliefs.iter_mut().for_each(|belief| belief.weight /= sum);
+        self.stage = Stage::Weighed;
+        Ok(())
+    }
+
+    /// Changes the settings of the prior other than the correlation time, and keeps the observations.
+    pub(crate) fn set_prior(&mut self, prior: Prior) {
+        self.kernels = Kernels::new(&prior, &prior.moments(), &self.table);
+        self.prior = prior;
+        self.stage = Stage::Observed;
+    }
+
+    /// Returns the share of the movement that was seen at a time, for the estimated duration, and the factors of the bands.
+    pub(crate) fn factors(&self, duration: f64) -> Factors {
+        let [first, last] = self.times.unwrap_or_default();
+        self.prior.calibration().at((last - first) / duration)
+    }
+}
+
+/// Checks that the movements of a model are linear in parameters at a clock that is linear in time.
+pub(crate) fn check_linear(model: &Model) -> Result<()> {
+    let unsuitable = |problem| Err(Error::Argument { name: "model", problem });
+    if model.primitive().coordinates().is_some() {
+        return unsuitable("has rotations, for which there is no recognition: fit the positions alone");
+    }
+    if model.breaks().len() > 2 {
+        return unsuitable("has a time warp, for which there is no recognition: fit it with linear time");
+    }
+    Ok(())
+}
+
+/// Returns hypotheses of duration, and of start or phase.
+fn hypotheses(prior: &Prior, timing: Timing, moments: &Moments, n_durations: usize) -> Result<Vec<Hypothesis>> {
+    let Moments { log_mean, log_deviation, .. } = *moments;
+    let [earliest, latest] = timing.starts;
+    check_number("starts", 0, earliest)?;
+    check_number("starts", 1, latest)?;
+    check_range("starts", latest, latest >= earliest, "must not be before the earliest start")?;
+    let rhythmic = prior.kind() == Kind::Rhythmic;
+    let n_starts = if rhythmic {
+        N_PHASES
+    } else if latest > earliest {
+        N_STARTS
+    } else {
+        1
+    };
+    let mut logs = vec![log_mean];
+    match timing.duration {
+        Some(duration) => {
+            check_range(
+                "duration",
+                duration,
+                (1e-9..=1e9).contains(&duration),
+                "seconds must lie between 1e-9 and 1e9",
+            )?;
+            logs[0] = duration.ln();
+        }
+        None => {
+            let n = if n_starts == 1 { n_durations } else { N_DURATIONS_OF_STARTS };
+            let ends = [f64::min, f64::max].map(|end| prior.log_durations().iter().copied().fold(log_mean, end));
+            let (low, high) = (ends[0] - MARGIN * log_deviation, ends[1] + MARGIN * log_deviation);
+            logs = (0..n).map(|k| low + (high - low) * k as f64 / (n - 1) as f64).collect();
+        }
+    }
+    let start = |duration: f64, k: usize| match (rhythmic, n_starts) {
+        (true, n) => -(k as f64) / n as f64,
+        (false, 1) => earliest / duration,
+        (false, n) => (earliest + (latest - earliest) * k as f64 / (n - 1) as f64) / duration,
+    };
+    let of = |&log: &f64| {
+        let duration = log.exp();
+        (0..n_starts).map(move |k| Hypothesis { duration, log: log - log_mean, start: start(duration, k) })
+    };
+    Ok(logs.iter().flat_map(of).collect())
+}

@@ -1,0 +1,136 @@
+//! Recognition of movements: no allocation, bounded time, refusals, and estimates of synthetic movements.
+#![cfg(feature = "learning")]
+#![allow(missing_docs)]
+
+mod common;
+#[path = "common/counting.rs"]
+mod counting;
+
+use common::*;
+use counting::{Random, allocations};
+use pdmp_core::inference::{Prior, Recogniser, Timing};
+use pdmp_core::learning::learn_prior;
+use pdmp_core::numerics::Threads;
+use pdmp_core::{Demonstration, Kind, Model};
+
+fn recordings() -> Vec<Demonstration> {
+    (0..12).map(|k| reach(0.05 * f64::from(k), 0.8 + 0.05 * f64::from((7 * k) % 12), 0.01)).collect()
+}
+
+fn learnt(demos: &[Demonstration], kind: Kind) -> (Model, Prior) {
+    let model = (*learn(demos, &options(kind))).clone();
+    let prior = learn_prior(&model, demos, None, Threads::ONE).unwrap();
+    (model, prior)
+}
+
+/// Observations and estimates do not allocate, with samples missing, gaps, and after a reset.
+#[test]
+fn observations_allocate_nothing() {
+    let (model, prior) = learnt(&recordings(), Kind::Discrete);
+    let mut recogniser = Recogniser::new(&model, &prior, Timing { starts: [-0.2, 0.3], duration: None }).unwrap();
+    let mut random = Random(2);
+    let before = allocations();
+    let mut time = 0.0;
+    for _ in 0..40 {
+        time += random.scale(1e-3, 0.2);
+        let mut place = || if random.rarely() { f64::NAN } else { random.next() };
+        let position = [place(), place(), place()];
+        recogniser.update(time, &position).unwrap();
+        if position.iter().any(|y| !y.is_nan()) {
+            recogniser.estimate().unwrap();
+        }
+    }
+    assert_eq!(allocations() - before, 0);
+}
+
+/// From half of a new movement, goal and duration are known to a few hundredths of their range.
+#[test]
+fn half_a_movement_gives_the_whole() {
+    let demos = recordings();
+    let (model, prior) = learnt(&demos, Kind::Discrete);
+    let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
+    let new = reach(0.33, 1.1, 0.01);
+    for k in 0..55 {
+        // One DoF is missing in every third sample.
+        let mut position = new.position().row(k).to_vec();
+        if k % 3 == 1 {
+            position[0] = f64::NAN;
+        }
+        recogniser.update(5.0 + 0.01 * k as f64, &position).unwrap();
+    }
+    let estimate = recogniser.estimate().unwrap();
+    assert!((estimate.duration / 1.1).ln().abs() < 0.05, "{}", estimate.duration);
+    assert!((estimate.arrival - 6.1).abs() < 0.06 && (estimate.fraction - 0.49).abs() < 0.04);
+    let last = new.position().row(new.n_samples() - 1).to_vec();
+    assert!(estimate.goal().iter().zip(&last).all(|(a, b)| (a - b).abs() < 0.02), "{:?} {last:?}", estimate.goal());
+    assert!(estimate.surprise < 2.0);
+    let conditions = estimate.conditions();
+    assert_eq!(conditions.style.map(|style| style.len()), Some(model.n_styles()));
+    let time: Vec<f64> = (55..111).map(|k| 5.0 + 0.01 * f64::from(k)).collect();
+    let rest = recogniser.continuation(&time).unwrap();
+    let error =
+        (&rest.position - &new.position().slice(ndarray::s![55..111, ..])).mapv(f64::abs).fold(0.0, |a, b| b.max(a));
+    assert!(error < 0.04, "{error}");
+}
+
+/// A movement that differs from all demonstrations is surprising.
+#[test]
+fn another_movement_is_surprising() {
+    let (model, prior) = learnt(&recordings(), Kind::Discrete);
+    let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
+    for k in 0..50 {
+        let s = 0.02 * f64::from(k);
+        recogniser.update(0.01 * f64::from(k), &[0.2 + (9.0 * s).sin() * 0.3, -s, s]).unwrap();
+    }
+    let surprise = recogniser.estimate().unwrap().surprise;
+    assert!(surprise > 5.0, "{surprise}");
+}
+
+/// Period and phase of a cycle are known from less than one period.
+#[test]
+fn part_of_a_cycle_gives_period_and_phase() {
+    let demos: Vec<_> =
+        (0..10).map(|k| cycle(0.04 * f64::from(k), 0.9 + 0.04 * f64::from((3 * k) % 10), 120)).collect();
+    let (model, prior) = learnt(&demos, Kind::Rhythmic);
+    let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
+    let new = cycle(0.22, 1.1, 110);
+    for k in 0..80 {
+        recogniser.update(0.01 * k as f64, &new.position().row((k + 30) % 110).to_vec()).unwrap();
+    }
+    let estimate = recogniser.estimate().unwrap();
+    assert!((estimate.duration / 1.1).ln().abs() < 0.08, "{}", estimate.duration);
+    assert!((estimate.fraction - 109.0 / 110.0 + 0.5).rem_euclid(1.0) - 0.5 < 0.06, "{}", estimate.fraction);
+}
+
+/// Bad input is refused, and the recogniser then remains as it was.
+#[test]
+fn bad_observations_are_refused() {
+    let demos = recordings();
+    let (model, prior) = learnt(&demos, Kind::Discrete);
+    let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
+    assert!(recogniser.estimate().is_err(), "nothing was observed");
+    recogniser.update(0.0, &[f64::NAN; 3]).unwrap();
+    assert!(recogniser.estimate().is_err(), "every sample is missing");
+    recogniser.update(0.1, &[0.2, 0.0, 0.0]).unwrap();
+    let before = recogniser.estimate().unwrap().clone();
+    for (time, position) in [(0.1, vec![0.2; 3]), (0.05, vec![0.2; 3]), (f64::NAN, vec![0.2; 3]), (0.2, vec![0.2; 2])] {
+        assert!(recogniser.update(time, &position).is_err());
+    }
+    assert!(recogniser.update(0.2, &[f64::INFINITY, 0.0, 0.0]).is_err());
+    assert_eq!(*recogniser.estimate().unwrap(), before);
+    assert!(recogniser.continuation(&[0.05]).is_err(), "a time before the last observation");
+    assert!(recogniser.continuation(&[f64::NAN]).is_err());
+
+    let threads = Threads::ONE;
+    assert!(learn_prior(&model, &demos[..5], None, threads).is_err(), "other demonstrations");
+    assert!(learn_prior(&model, &demos, Some(&[0; 12]), threads).is_err(), "one group");
+    assert!(learn_prior(&model, &demos, Some(&[0; 3]), threads).is_err(), "too few groups");
+    let few = learn(&demos[..3], &options(Kind::Discrete));
+    assert!(learn_prior(&few, &demos[..3], None, threads).is_err(), "too few demonstrations");
+    let other = learn(&cycles(), &options(Kind::Rhythmic));
+    assert!(Recogniser::new(&other, &prior, Timing::default()).is_err(), "a prior of another model");
+    for timing in [[0.1, 0.0], [f64::NAN, 0.0]] {
+        assert!(Recogniser::new(&model, &prior, Timing { starts: timing, duration: None }).is_err());
+    }
+    assert!(Recogniser::new(&model, &prior, Timing { duration: Some(0.0), ..Timing::default() }).is_err());
+}

@@ -1,0 +1,149 @@
+"""Recognition of movements from Python: estimates, missing samples, pickles and refusals."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import pdmp
+
+S = np.linspace(0, 1, 61)[:, None]
+RISE = S**3 * (10 - 15 * S + 6 * S**2)
+
+
+def reach(height, goal=0.5, duration=1.0):
+    """Returns a reach over an obstacle."""
+    path = np.hstack([goal * RISE, height * (4 * S * (1 - S)) ** 3])
+    return pdmp.Demonstration(path, dt=duration / 60)
+
+
+@pytest.fixture(scope="module")
+def demos():
+    """Returns reaches of random height, length and duration."""
+    rng = np.random.default_rng(0)
+    return [reach(*rng.uniform([0.1, 0.4, 0.8], [0.5, 0.8, 1.2]).tolist()) for _ in range(12)]
+
+
+@pytest.fixture(scope="module")
+def model(demos):
+    """Returns their model."""
+    return pdmp.fit(demos)
+
+
+@pytest.fixture(scope="module")
+def prior(model, demos):
+    """Returns their prior."""
+    return model.prior(demos)
+
+
+def watched(recogniser, demo, n):
+    """Shows the first n samples, with one of two positions missing at times."""
+    for k in range(n):
+        position = demo.position[k].copy()
+        if k % 5 == 3:
+            position[k % 2] = np.nan
+        recogniser.update(demo.time[k], position)
+    return recogniser
+
+
+def test_half_a_movement_gives_goal_and_time(model, prior):
+    """Half of a new reach gives goal, arrival and continuation to a few hundredths."""
+    demo = reach(0.27, 0.65, 1.1)
+    recogniser = watched(model.recogniser(prior), demo, 31)
+    estimate = recogniser.estimate()
+    assert np.abs(estimate.goal - demo.position[-1]).max() < 0.03
+    assert estimate.arrival == pytest.approx(1.1, abs=0.08)
+    assert estimate.fraction == pytest.approx(0.5, abs=0.05)
+    ahead = recogniser.continuation(demo.time[31:])
+    assert np.abs(ahead.position - demo.position[31:]).max() < 0.05
+    assert (ahead.deviation > 0).all() and ahead.time.shape == (30,)
+
+
+def test_conditions_of_an_estimate_make_the_whole_movement(model, prior):
+    """Rollout and controller take the conditions of an estimate."""
+    demo = reach(0.4, 0.5, 0.9)
+    estimate = watched(model.recogniser(prior), demo, 45).estimate()
+    whole = model.rollout(dt=0.01, conditions=estimate.conditions)
+    assert np.abs(whole.position[-1] - demo.position[-1]).max() < 0.03
+    controller = model.controller(dt=0.01, conditions=estimate.conditions)
+    controller.step()
+
+
+def test_a_known_duration_is_one_hypothesis(model, prior):
+    """A given duration is not estimated."""
+    recogniser = model.recogniser(prior, duration=1.1)
+    assert recogniser.n_hypotheses == 1
+    estimate = watched(recogniser, reach(0.2, 0.6, 1.1), 20).estimate()
+    assert estimate.duration == pytest.approx(1.1) and estimate.duration_deviation == 0
+
+
+def test_an_unknown_start_is_found(model, prior):
+    """A hand that rests before it reaches arrives later by that time."""
+    demo = reach(0.3, 0.6, 1.0)
+    recogniser = model.recogniser(prior, starts=(0.0, 0.6))
+    rest = np.tile(demo.position[0], (20, 1))
+    for k, position in enumerate(np.vstack([rest, demo.position[:40]])):
+        recogniser.update(k * demo.time[1], position)
+    estimate = recogniser.estimate()
+    assert estimate.arrival == pytest.approx(1.0 + 20 * demo.time[1], abs=0.12)
+
+
+def test_the_estimate_depends_on_time_differences_alone(model, prior):
+    """A shift of the clock shifts the arrival alone; a reset forgets all."""
+    demo = reach(0.3)
+    first = watched(model.recogniser(prior), demo, 25)
+    later = model.recogniser(prior)
+    later.update(7.0, demo.position[0])
+    later.reset()
+    for k in range(25):
+        position = demo.position[k].copy()
+        if k % 5 == 3:
+            position[k % 2] = np.nan
+        later.update(demo.time[k] + 100.0, position)
+    a, b = first.estimate(), later.estimate()
+    np.testing.assert_allclose(a.goal, b.goal, rtol=1e-6)
+    assert a.arrival == pytest.approx(b.arrival - 100.0, rel=1e-6)
+
+
+def test_a_prior_is_the_same_after_a_pickle(model, prior):
+    """A pickled prior gives the same estimates, bit for bit."""
+    same = pickle.loads(pickle.dumps(prior))
+    assert repr(same) == repr(prior)
+    np.testing.assert_array_equal(same.parameters, prior.parameters)
+    a, b = (watched(model.recogniser(each), reach(0.3), 20).estimate() for each in (prior, same))
+    np.testing.assert_array_equal(a.goal, b.goal)
+    np.testing.assert_array_equal(a.goal_deviation, b.goal_deviation)
+    assert 0 < prior.bandwidth <= 1 and 0 < prior.tempering <= 1 and prior.correlation_time > 0
+    assert prior.residual.shape == (2,)
+
+
+def test_groups_of_people_are_names(model, demos):
+    """Groups are any names, at least two."""
+    prior = model.prior(demos, groups=["a", "b", "c"] * 4)
+    assert len(prior.parameters) == 12
+    with pytest.raises(ValueError, match="groups"):
+        model.prior(demos, groups=["a"] * 12)
+    with pytest.raises(TypeError, match="groups"):
+        model.prior(demos, groups=[[1]] * 12)
+
+
+def test_bad_input_is_refused(model, demos, prior):
+    """An error names the argument."""
+    recogniser = model.recogniser(prior)
+    with pytest.raises(ValueError, match="update"):
+        recogniser.estimate()
+    recogniser.update(0.0, demos[0].position[0])
+    with pytest.raises(ValueError, match="time"):
+        recogniser.update(0.0, demos[0].position[1])
+    with pytest.raises(ValueError, match="position"):
+        recogniser.update(0.1, [0.0])
+    with pytest.raises(ValueError, match="position"):
+        recogniser.update(0.1, [np.inf, 0.0])
+    with pytest.raises(ValueError, match="time"):
+        recogniser.continuation([-1.0])
+    with pytest.raises(TypeError, match="prior"):
+        model.recogniser(model)
+    with pytest.raises(ValueError, match="starts"):
+        model.recogniser(prior, starts=(1.0, 0.0))
+    with pytest.raises(ValueError, match="demonstrations"):
+        model.prior(demos[:5])
