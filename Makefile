@@ -33,7 +33,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-controllers bench-scaling bench-streaming bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install packages header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-controllers bench-scaling bench-streaming bench-bases bench-transport bench-robots bench-poses report bench-recognition rtsan fuzz asan licences capi install packages header stubs \
 	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -92,6 +92,9 @@ bench-poses: .venv/with-reproduction  ## A recorded tool path on a Panda, and a 
 report: .venv/with-test  ## Errors of predictions from contexts and from points, on the recordings in PDMP_DATA; figures into out/report/
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report.via_points
+
+bench-recognition: .venv/with-test  ## Errors of movements that are recognised on their way, on the recordings in PDMP_DATA
+	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report.recognition
 
 # The sanitizer may not touch build scripts, which a named target spares. A compiler without it says why.
 rtsan: | needs  ## Runs the control loop under the real-time sanitizer of a nightly compiler, where there is one
