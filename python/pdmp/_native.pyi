@@ -133,7 +133,8 @@ class Demonstration:
         First column of each unit quaternion, as an index or a name, and the order of its components: {3: "wxyz"} or
         {3: "xyzw"}. A quaternion rotates from the body frame to the world frame; the other convention is not
         recognised. Norms become 1, and signs continuous along time. `position`, `goal`, `names` and `units` have one element
-        per column; a rotation has four columns and three degrees of freedom.
+        per column; a rotation has four columns and three degrees of freedom. The three columns before it, else after it,
+        with one unit that is none of an angle are the point of the pose: its components share their noise and range.
 
     Raises
     ------
