@@ -519,6 +519,37 @@ pdmp_status pdmp_controller_forecast(pdmp_controller *controller,
                                      size_t n_samples,
                                      const pdmp_motion *motion);
 
+/// Converts the poses of two arms to an absolute and a relative pose. With positions p and unit quaternions q of both arms,
+///
+///     r = q_left^-1 q_right          h = (1 + r) / |1 + r|, half of this rotation
+///     absolute:  (p_left + p_right) / 2      q_left h
+///     relative:  R(q_absolute)^T (p_right - p_left)      r
+///
+/// Poses are x, y, z, qw, qx, qy, qz. `reference` is a rotation q_left^-1 q_right of the task, as qw, qx, qy, qz: r is taken
+/// with the sign on its side, which makes the absolute pose continuous except half a turn from it. `{NULL, 0}` is the identity,
+/// which does not suit grippers that face each other.
+///
+/// This function does not allocate. Errors: PDMP_NULL, PDMP_LENGTH, PDMP_RANGE if a number is not finite, the norm of a
+/// quaternion deviates from 1 by more than 1e-3, or r is more than 175 degrees from the reference.
+pdmp_status pdmp_absolute_relative(pdmp_vector left,
+                                   pdmp_vector right,
+                                   pdmp_vector reference,
+                                   pdmp_buffer absolute,
+                                   pdmp_buffer relative,
+                                   pdmp_text error);
+
+/// Converts an absolute and a relative pose to the poses of two arms, the inverse of pdmp_absolute_relative:
+///
+///     p_left, p_right = p_absolute -/+ R(q_absolute) p_relative / 2      q_left, q_right = q_absolute h^-1, q_absolute h
+///
+/// with h h = q_relative. Arguments and errors are as there; this function does not allocate either.
+pdmp_status pdmp_left_right(pdmp_vector absolute,
+                            pdmp_vector relative,
+                            pdmp_vector reference,
+                            pdmp_buffer left,
+                            pdmp_buffer right,
+                            pdmp_text error);
+
 #ifdef __cplusplus
 }  // extern "C"
 #endif  // __cplusplus

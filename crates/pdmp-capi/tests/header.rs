@@ -10,7 +10,17 @@ use cbindgen::{Builder, Config};
 fn header_is_fresh() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = Config::from_file(root.join("cbindgen.toml")).unwrap();
-    let sources = ["status", "buffers", "model", "command", "controller", "limits", "controller_copies", "trajectory"];
+    let sources = [
+        "status",
+        "buffers",
+        "model",
+        "command",
+        "controller",
+        "limits",
+        "controller_copies",
+        "trajectory",
+        "two_arms",
+    ];
     let builder = sources.iter().fold(Builder::new().with_config(config), |builder, name| {
         builder.with_src(root.join(format!("src/{name}.rs")))
     });
