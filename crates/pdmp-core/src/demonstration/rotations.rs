@@ -104,8 +104,8 @@ pub(crate) fn points(units: &[String], rotations: &[RotationColumns]) -> Vec<Ran
     for rotation in rotations {
         let dof = |column: usize| plain.iter().find(|[other, _]| *other == column).map(|[_, dof]| *dof);
         let is_point = |&column: &usize| {
-            let mut columns = column..column + 3;
-            columns.all(|c| dof(c).is_some() && units[c] == units[column]) && turn_of(&units[column]).is_none()
+            let other = (column..column + 3).find(|&c| dof(c).is_none() || units[c] != units[column]);
+            other.is_none() && turn_of(&units[column]).is_none()
         };
         let sides = [rotation.column.checked_sub(3), Some(rotation.column + 4)];
         let Some(column) = sides.into_iter().flatten().find(is_point) else { continue };

@@ -343,6 +343,25 @@ impl BlockStyles {
 
     /// Reads styles from bytes.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions};
+    /// use pdmp_core::learning::{BlockStyles, PartialFit, StyleProjection};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let options = FitOptions::discrete();
+    /// # let mut partial = PartialFit::new(&demos, &options)?;
+    /// # partial.update(&demos)?;
+    /// let factorised = partial.factorise(&options, &mut |_, _| Ok(()))?;
+    /// // In another process:
+    /// let projection = StyleProjection::from_bytes(&factorised.projection().to_bytes()?)?;
+    /// let bytes = projection.styles(&demos, 0, &mut |_| Ok(()))?.to_bytes()?;
+    /// // Back in the first one:
+    /// let model = factorised.finish(vec![BlockStyles::from_bytes(&bytes)?], &mut |_, _| Ok(()))?;
+    /// assert_eq!(model.n_demos(), 3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// Bytes that are damaged, not the styles of a block, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {

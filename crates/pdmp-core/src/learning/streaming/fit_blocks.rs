@@ -54,6 +54,22 @@ pub fn fit_blocks<'a>(
 impl FactorisedFit {
     /// Returns the model, given all blocks once more in the order of the first pass.
     ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions};
+    /// # use pdmp_core::learning::PartialFit;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// let options = FitOptions::discrete();
+    /// let mut partial = PartialFit::new(&demos, &options)?;
+    /// demos.chunks(2).try_for_each(|block| partial.update(block))?;
+    /// let factorised = partial.factorise(&options, &mut |_, _| Ok(()))?;
+    /// let blocks = Box::new(demos.chunks(2).map(|block| Ok(block.to_vec())));
+    /// let model = factorised.finish_blocks(blocks, &mut |_, _| Ok(()))?;
+    /// assert_eq!(model.n_demos(), 3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// Blocks that differ from those of the first pass, an error of a block, or that which `progress` returned.
     pub fn finish_blocks(

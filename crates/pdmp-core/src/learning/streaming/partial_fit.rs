@@ -38,8 +38,8 @@ const MAX_FINDINGS: usize = 100;
 /// let mut partial = PartialFit::new(&demos[..1], &options)?;
 /// partial.update(&demos[..1])?;
 /// let mut others = partial.empty();
-/// others.update(&demos[1..])?;
-/// partial.merge(&others)?;
+/// others.update_with(&demos[1..], &mut |_| Ok(()))?;
+/// partial.merge(&PartialFit::from_bytes(&others.to_bytes()?)?)?;
 /// assert_eq!(partial.n_demos(), 3);
 ///
 /// let factorised = partial.factorise(&options, &mut |_, _| Ok(()))?;
