@@ -1,6 +1,6 @@
 //! Prior distributions of the parameters of a movement.
 
-use pdmp_core::inference::{Calibration, Factors, Settings};
+use pdmp_core::inference::{BandFactors, Calibration, Settings};
 use pdmp_core::learning::learn_prior;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -38,7 +38,8 @@ impl Prior {
         let kind = if rhythmic { pdmp_core::Kind::Rhythmic } else { pdmp_core::Kind::Discrete };
         let [bandwidth, tempering, correlation_time] = settings;
         let settings = Settings { bandwidth, tempering, correlation_time };
-        let factors = factors.map(|[position, goal, duration, misfit]| Factors { position, goal, duration, misfit });
+        let factors =
+            factors.map(|[position, goal, duration, misfit]| BandFactors { position, goal, duration, misfit });
         let parameters = matrix("parameters", "(M, K)", parameters)?;
         let (durations, residual) = (vector("log_durations", log_durations)?, vector("residual", residual)?);
         let calibration = Calibration(factors);

@@ -6,7 +6,7 @@ pub(crate) const SHARES: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
 /// Factors at one share of a movement that was seen: the quantile of 0.9 of cross-validated errors, each divided by the
 /// quantile of its Gaussian band.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factors {
+pub struct BandFactors {
     /// Factor of the standard deviations of the positions to come.
     pub position: f64,
     /// Factor of the standard deviations of the goal or anchor.
@@ -17,7 +17,7 @@ pub struct Factors {
     pub misfit: f64,
 }
 
-impl Factors {
+impl BandFactors {
     /// Factors of a model whose assumptions hold.
     pub const ONE: Self = Self { position: 1.0, goal: 1.0, duration: 1.0, misfit: 1.0 };
 
@@ -36,14 +36,14 @@ impl Factors {
 /// Coverage holds by exchangeability: a new movement is as likely as each held-out one to have the larger error
 /// (conformal prediction; J. Lei et al., JASA 113, 2018, doi:10.1080/01621459.2017.1307116).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Calibration(pub [Factors; SHARES.len()]);
+pub struct Calibration(pub [BandFactors; SHARES.len()]);
 
 impl Calibration {
     /// Calibration of a model whose assumptions hold.
-    pub const NONE: Self = Self([Factors::ONE; SHARES.len()]);
+    pub const NONE: Self = Self([BandFactors::ONE; SHARES.len()]);
 
     /// Returns the factors at a share, linear between the measured ones and constant beyond.
-    pub(crate) fn at(&self, share: f64) -> Factors {
+    pub(crate) fn at(&self, share: f64) -> BandFactors {
         let after = SHARES.iter().position(|&s| s >= share).unwrap_or(SHARES.len() - 1).max(1);
         let span = SHARES[after] - SHARES[after - 1];
         let weight = ((share - SHARES[after - 1]) / span).clamp(0.0, 1.0);

@@ -19,7 +19,7 @@ pub(crate) mod recogniser;
 mod via_points;
 
 pub(crate) use calibration::SHARES;
-pub use calibration::{Calibration, Factors};
+pub use calibration::{BandFactors, Calibration};
 pub use continuation::Continuation;
 pub use estimate::Estimate;
 pub(crate) use movement_table::responses;

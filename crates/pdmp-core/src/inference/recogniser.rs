@@ -1,6 +1,6 @@
 //! Recognition of a movement while it is observed.
 
-use super::calibration::Factors;
+use super::calibration::BandFactors;
 use super::estimate::{Estimate, MIN_WEIGHT};
 use super::evidence::{Belief, Kernels, Scratch};
 use super::movement_table::MovementTable;
@@ -288,7 +288,7 @@ impl Recogniser {
     }
 
     /// Returns the share of the movement that was seen at a time, for the estimated duration, and the factors of the bands.
-    pub(crate) fn factors(&self, duration: f64) -> Factors {
+    pub(crate) fn factors(&self, duration: f64) -> BandFactors {
         let [first, last] = self.times.unwrap_or_default();
         self.prior.calibration().at((last - first) / duration)
     }

@@ -10,7 +10,7 @@ use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::inference::prior::MIN_DEMOS;
 use crate::inference::recogniser::check_linear;
-use crate::inference::{Calibration, Factors, Prior, SHARES, Settings};
+use crate::inference::{BandFactors, Calibration, Prior, SHARES, Settings};
 use crate::kind::Kind;
 use crate::model::Model;
 use crate::numerics::threads::Threads;
@@ -188,7 +188,7 @@ fn calibration(outcomes: &[Outcome]) -> Calibration {
     Calibration([0, 1, 2, 3].map(|share| {
         let own = outcomes.iter().filter(|outcome| outcome.share == share);
         let of = |errors: &dyn Fn(&Outcome) -> Vec<f64>| quantile(own.clone().flat_map(errors).collect());
-        Factors {
+        BandFactors {
             position: of(&|outcome| outcome.positions.clone()) / BAND,
             goal: of(&|outcome| outcome.goals.clone()) / BAND,
             duration: of(&|outcome| vec![outcome.duration]) / BAND,
