@@ -43,8 +43,8 @@ reproduce: .venv/with-reproduction  ## The paper's figures, on a simulated robot
 	$(BIN)/python -m reproduction all -o out/reproduction $(if $(WALKS),--recordings $(WALKS))
 
 test: .venv/with-test  ## Runs every test, Rust and Python
-	cargo test --release --workspace
-	cargo test --release --package pdmp-core --no-default-features --test runtime
+	cargo test --profile tests --workspace
+	cargo test --profile tests --package pdmp-core --no-default-features --test runtime
 	$(BIN)/pytest
 
 check: .venv/with-dev  ## Formatting, lints, links in the documentation, types, stubs against the module, prose, and licences

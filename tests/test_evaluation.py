@@ -238,11 +238,13 @@ def test_missing_library_leaves_its_predictor_out(monkeypatch: pytest.MonkeyPatc
     assert "left out: PCA, Gaussian processes: scikit-learn is not installed" in repr(found)
 
 
-def test_evaluation_is_imported_at_first_use() -> None:
-    """Importing the package does not import the evaluation before its first use."""
+@pytest.mark.parametrize("name", ["evaluate", "io", "plot", "preprocessing"])
+def test_modules_are_imported_at_first_use(name: str) -> None:
+    """Importing the package imports no module that a control loop does not need."""
+    module = f"pdmp.{name}".replace("evaluate", "evaluation")
     code = (
-        "import sys, pdmp; assert 'pdmp.evaluation' not in sys.modules; "
-        "pdmp.evaluate; assert 'pdmp.evaluation' in sys.modules"
+        f"import sys, pdmp; assert '{module}' not in sys.modules; "
+        f"pdmp.{name}; assert '{module}' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -13,7 +13,6 @@ multiple demonstrations", Neural Networks 24 (2011), https://doi.org/10.1016/j.n
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
-from pdmp import io, plot, preprocessing
 from pdmp._limits import Limits
 from pdmp._native import (
     GP,
@@ -56,7 +55,7 @@ from pdmp._native import (
 from pdmp.realtime import PacedLoop, Tick
 
 if _TYPE_CHECKING:
-    from pdmp import autodiff, datasets, evaluation, robots
+    from pdmp import autodiff, datasets, evaluation, io, plot, preprocessing, robots
     from pdmp._distributed import fit_distributed
     from pdmp.evaluation import evaluate
 else:
@@ -67,7 +66,7 @@ else:
             return _import_module("pdmp.evaluation").evaluate
         if name == "fit_distributed":
             return _import_module("pdmp._distributed").fit_distributed
-        if name in ("autodiff", "datasets", "evaluation", "robots"):
+        if name in ("autodiff", "datasets", "evaluation", "io", "plot", "preprocessing", "robots"):
             return _import_module(f"pdmp.{name}")
         raise AttributeError(f"module 'pdmp' has no attribute '{name}'")
 
