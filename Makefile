@@ -33,7 +33,7 @@ COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-trace-compares
 SANITIZED := RUSTC_BOOTSTRAP=1 RUSTFLAGS='-Zsanitizer=address
 
-.PHONY: demo reproduce test check bench bench-peers bench-controllers bench-scaling bench-streaming bench-bases bench-transport bench-robots bench-poses report bench-recognition rtsan fuzz asan licences capi install packages header stubs \
+.PHONY: demo reproduce test check bench bench-peers bench-controllers bench-scaling bench-streaming bench-bases bench-transport bench-robots bench-poses report rtsan fuzz asan licences capi install packages header stubs \
 	docs clean needs
 
 demo: .venv/with-demo  ## Learns human handwriting and writes model, figures and a table to out/demo/
@@ -89,11 +89,9 @@ bench-robots: .venv/with-reproduction  ## Simulated robots under random commands
 bench-poses: .venv/with-reproduction  ## A recorded tool path on a Panda, and a box between the arms of a Baxter, with PDMP_DATA
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m poses
 
-report: .venv/with-test  ## Errors of predictions from contexts and from points, on the recordings in PDMP_DATA; figures into out/report/
+report: .venv/with-test  ## Errors of predictions from contexts, from points and from half a movement, on the recordings in PDMP_DATA; figures into out/report/
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report.via_points
-
-bench-recognition: .venv/with-test  ## Errors of movements that are recognised on their way, on the recordings in PDMP_DATA
 	OMP_NUM_THREADS=1 PYTHONPATH=benches $(BIN)/python -m report.recognition
 
 # The sanitizer may not touch build scripts, which a named target spares. A compiler without it says why.

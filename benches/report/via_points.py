@@ -13,12 +13,12 @@ import numpy as np
 import pdmp
 from pdmp._markdown import markdown_table
 from recordings import discrete
+from report.promp import N_WEIGHTS, ProMP
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SAMPLES = 101
 FOLDS = 4  # of a task, evenly spaced
 MAX_DEMOS = 60
-N_WEIGHTS = 20  # radial basis functions of a degree of freedom of the ProMP
 MIN_DEMOS = 5
 PLACES = {
     "1 point": ((25,), (50,), (75,)),
@@ -133,22 +133,8 @@ def moved_goal(model: pdmp.Model, others: list[Array], at: list[int], points: Ar
 
 def conditioned(model: pdmp.Model, others: list[Array], at: list[int], points: Array) -> Array:
     """Returns the movement of a ProMP conditioned on the points."""
-    centres = np.linspace(0, 1, N_WEIGHTS)
-    distances = (np.linspace(0, 1, SAMPLES)[:, None] - centres) * (N_WEIGHTS - 1)
-    basis = np.exp(-0.5 * distances**2)
-    basis /= basis.sum(axis=1, keepdims=True)
-    ridge = basis.T @ basis + 1e-4 * np.eye(N_WEIGHTS)
-    weights = np.array([np.linalg.solve(ridge, basis.T @ movement) for movement in others])
-    mean, n_dofs = weights.mean(axis=0), points.shape[1]
-    deviations = (weights - mean).reshape(len(others), -1) / np.sqrt(len(others) - 1)
-    # Deviations of the points, (M, n·D).
-    rows = np.einsum("tw,mwd->mtd", basis[at], deviations.reshape(-1, N_WEIGHTS, n_dofs))
-    rows = rows.reshape(len(others), -1)
-    ranges = np.ptp(np.concatenate(others), axis=0)
-    noise = np.diag(np.tile((0.01 * ranges) ** 2, len(at)))
-    residual = (points - basis[at] @ mean).ravel()
-    change = deviations.T @ (rows @ np.linalg.solve(rows.T @ rows + noise, residual))
-    return basis @ (mean + change.reshape(N_WEIGHTS, n_dofs))
+    phases = np.linspace(0, 1, SAMPLES)
+    return ProMP(np.array(others)).conditioned(phases[at], points, phases)
 
 
 METHODS: dict[str, Complete] = {
