@@ -69,7 +69,7 @@ def read_blocks(
     """Returns the demonstrations that `read` would return, in blocks that are read when needed.
 
     `pdmp.fit` and `pdmp.fit_distributed` take the result, and then have one block in memory for
-    each process. A block is read anew in each pass, from its own files; of data sets of LeRobot,
+    each process. A block is read in every pass, from its own files alone; of data sets of LeRobot,
     from the files and row groups with its episodes. Metadata and indices are read here, once.
 
     Parameters
