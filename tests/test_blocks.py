@@ -90,15 +90,19 @@ def test_a_block_reads_the_row_groups_of_its_episodes(tmp_path: Path) -> None:
             blocks[1]()
 
 
-def test_a_file_that_is_not_where_the_metadata_state_is_found_by_its_content(
-    tmp_path: Path,
-) -> None:
-    """Data files of other names are searched for the episodes."""
-    folder = recorded.write_lerobot(tmp_path / "set", "v3.0", [recorded.path_of(0)] * 4)
+def test_frames_are_found_in_files_that_the_metadata_do_not_state(tmp_path: Path) -> None:
+    """Files of other names, and of names that others should have, are searched for episodes."""
+    paths = [recorded.path_of(k) for k in range(4)]
+    folder = recorded.write_lerobot(tmp_path / "set", "v3.0", paths)
     whole = list(pdmp.io.read_lerobot(folder).values())
-    for k, file in enumerate(sorted((folder / "data").glob("*/*.parquet"))):
-        file.rename(file.with_name(f"part{1 - k}.parquet"))
-    assert_equal(pdmp.io.read_blocks(folder, size=1), whole)
+    data = folder / "data" / "chunk-000"
+    contents = [(data / name).read_bytes() for name in ("file-000.parquet", "file-001.parquet")]
+    for names in (["part", "file-000"], ["file-001", "part"], ["file-001", "file-000"]):
+        for file in data.iterdir():
+            file.unlink()
+        for name, content in zip(names, contents, strict=True):
+            (data / f"{name}.parquet").write_bytes(content)
+        assert_equal(pdmp.io.read_blocks(folder, size=1), whole)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".npz"])

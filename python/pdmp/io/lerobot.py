@@ -91,22 +91,24 @@ class Episodes:
     fps: Any
     options: Options
     episodes: dict[int, meta.Episode]
-    files: Sequence[Path]
-    """Data files that may hold the episodes."""
 
     def part(self, indices: Iterable[int]) -> Episodes:
-        """Returns some of the episodes, with the files that may hold these."""
-        episodes = {index: self.episodes[index] for index in indices}
-        own = {episode.file for episode in episodes.values() if episode.file is not None}
-        is_located = all(episode.file is not None for episode in episodes.values())
-        return replace(
-            self, episodes=episodes, files=sorted(own) if is_located else list(self.files)
-        )
+        """Returns some of the episodes."""
+        return replace(self, episodes={index: self.episodes[index] for index in indices})
 
     def read(self) -> NamedDemonstrations:
         """Returns the demonstrations by the indices of their episodes."""
-        others = [name for name in self.context if name != "task"]
-        frames = _frames(self.path, self.files, [*self.features, *others], self.episodes)
+        columns = [*self.features, *(name for name in self.context if name != "task")]
+        files = sorted({each.file for each in self.episodes.values() if each.file is not None})
+        frames = _frames(self.path, files, columns, self.episodes)
+        # Frames that are not where the metadata state are searched for in all files.
+        astray = [
+            index
+            for index, episode in self.episodes.items()
+            if index not in frames or len(frames[index]["timestamp"]) != episode.n_frames
+        ]
+        if astray:
+            frames |= _frames(self.path, _data_files(self.path), columns, astray)
         demos = NamedDemonstrations(context_names=self.context)
         for index, episode in self.episodes.items():
             demos[str(index)] = self._demonstration(index, episode, frames.get(index))
@@ -160,11 +162,15 @@ def open_lerobot(
     for name in wanted:
         if name != "task":
             meta.element_names(path, info, name)
-    files = sorted((path / "data").glob("*/*.parquet"))
+    files = _data_files(path)
     episodes = meta.read_episodes(path, files)
     if not files:
         raise value_error(f"{path}: no files data/*/*.parquet")
-    return Episodes(path, listed, wanted, names, info.get("fps"), options, episodes, files)
+    return Episodes(path, listed, wanted, names, info.get("fps"), options, episodes)
+
+
+def _data_files(path: Path) -> list[Path]:
+    return sorted((path / "data").glob("*/*.parquet"))
 
 
 def _frames(
