@@ -8,6 +8,9 @@ cases is left to `make fuzz`. Others are drawn, for a longer search, by
     PROPTEST_RNG_SEED=N cargo test --release      (0 by default, in .cargo/config.toml)
 """
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
 from hypothesis import settings
 
@@ -37,3 +40,16 @@ def model(request: pytest.FixtureRequest) -> pdmp.Model:
     fixture = {"discrete": "reach", "rhythmic": "cycle"}[request.param]
     fitted: pdmp.Model = request.getfixturevalue(fixture)
     return fitted
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Any]:
+    """Yields the client of a cluster of two processes."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as connected,
+    ):
+        yield connected

@@ -65,6 +65,8 @@ def write_lerobot(path: Path, version: str, paths: list[np.ndarray]) -> Path:
     if version == "v3.0":
         half = len(paths) // 2
         for k, part in enumerate([range(half), range(half, len(paths))]):
+            for episode in part:
+                rows[episode] |= {"data/chunk_index": 0, "data/file_index": k}
             tables = [frames(episode).cast(frames(0).schema) for episode in part]
             parquet.write_table(pyarrow.concat_tables(tables), folder / f"file-{k:03d}.parquet")
         episodes = path / "meta" / "episodes" / "chunk-000"

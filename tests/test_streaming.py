@@ -1,6 +1,7 @@
 """Fits of blocks of demonstrations: from functions and lists, partial fits and on a cluster."""
 
 import pickle
+import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -184,3 +185,69 @@ def test_cluster_survives_the_loss_of_a_worker(tmp_path: Path) -> None:
             pdmp.fit_distributed(blocks, client=client, progress=stop)
         with pytest.raises(ValueError, match="blocks is empty"):
             pdmp.fit_distributed([], client=client)
+
+
+def waiting(k: int, folder: Path) -> list[pdmp.Demonstration]:
+    """Returns a demonstration as a block; those from the twelfth wait until they are released."""
+    (folder / f"{k}.read").touch()
+    while k >= 12 and not (folder / "released").exists():
+        time.sleep(0.01)
+    return recordings()[k : k + 1]
+
+
+def test_an_exception_of_progress_cancels_the_tasks_of_a_cluster(
+    tmp_path: Path, client: Any
+) -> None:
+    """Blocks are read in their order, none after the cancellation, and the cluster is free."""
+    reported = []
+
+    def stop(stage: str, fraction: float) -> None:
+        reported.append((stage, fraction))
+        raise TimeoutError(stage)
+
+    blocks = [partial(waiting, k, tmp_path) for k in range(N_DEMOS)]
+    with pytest.raises(TimeoutError, match="targets"):
+        pdmp.fit_distributed(blocks, client=client, progress=stop)
+    (tmp_path / "released").touch()
+    n_tasks = count = 1
+    while n_tasks and count < 1000:  # the running tasks end
+        n_tasks = client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks))
+        time.sleep(0.01)
+        count += 1
+    assert n_tasks == 0
+    assert max(int(file.stem) for file in tmp_path.glob("*.read")) < N_DEMOS // 2
+    assert reported == [("targets", 1 / N_DEMOS)]
+    demos = recordings()
+    model = pdmp.fit_distributed(blocks_of(demos), client=client, n_samples=180)
+    assert_equal(model, pdmp.fit(demos, n_samples=180))
+
+    def stop_at_styles(stage: str, _: float) -> None:
+        if stage == "styles":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        pdmp.fit_distributed(blocks_of(demos), client=client, progress=stop_at_styles)
+
+
+def damaged(k: int, at: int, marker: Path | None = None) -> list[pdmp.Demonstration]:
+    """Returns a block; one raises an exception, the first time unless there is a marker."""
+    if k == at and (marker is None or marker.exists()):
+        raise OSError(5, "damaged", "demos.npz")
+    if k == at and marker is not None:
+        marker.touch()
+    return recordings()[SIZE * k : SIZE * (k + 1)]
+
+
+@pytest.mark.parametrize("at", [0, 2])
+def test_an_exception_of_a_block_names_it(tmp_path: Path, client: Any, at: int) -> None:
+    """The exception keeps type and arguments, whenever it is raised; a note has the index."""
+    for marker in (None, tmp_path / "read"):
+        blocks = [partial(damaged, k, at, marker) for k in range(4)]
+        with pytest.raises(OSError, match="damaged: 'demos.npz'") as raised:
+            pdmp.fit_distributed(blocks, client=client, n_samples=180)
+        assert (raised.value.errno, raised.value.filename) == (5, "demos.npz")
+        assert raised.value.__notes__ == [f"Raised for blocks[{at}]."]
+    others = [partial(np.zeros, (3, 160, 1)), blocks[1]]
+    with pytest.raises(ValueError, match="position has 2 DoFs") as mixed:
+        pdmp.fit_distributed(others, client=client, dt=0.01)
+    assert mixed.value.__notes__ == ["Raised for blocks[1]."]

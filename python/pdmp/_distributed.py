@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import copy
 import weakref
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from pdmp._native import (
@@ -66,8 +67,9 @@ def fit_distributed(
     ----------
     blocks : iterable of blocks, or dask.bag.Bag
         Lists of demonstrations or arrays (B, T, D), in the order of the demonstrations. Functions
-        without arguments that return one, Dask delayed objects and futures are computed by the
-        workers, so that no block passes through this process. Each partition of a bag is a block.
+        without arguments that return one, as from `io.read_blocks`, Dask delayed objects and
+        futures are computed by the workers, so that no block passes through this process. Each
+        partition of a bag is a block.
         Blocks that were scattered cannot be computed again when their worker is lost.
     client : distributed.Client, optional
         Client of the cluster; by default the current one.
@@ -86,7 +88,8 @@ def fit_distributed(
     Raises
     ------
     ValueError
-        The demonstrations or options are invalid, have rotations, or there is no block.
+        The demonstrations or options are invalid, have rotations, or there is no block. As in an
+        exception that the function of a block raises, a note names the block by its index.
     ImportError
         Dask is not installed.
 
@@ -154,12 +157,17 @@ class _Tasks:
     ) -> tuple[PartialFit, list[int]]:
         """Returns the partial fit of all blocks, and the number of demonstrations of each."""
         empty = self.submit(_empty, self.block(blocks[0]), options)
-        partials = [self.submit(_partial, empty, self.block(block)) for block in blocks]
-        sizes = [self.submit(_size, partial) for partial in partials]
+        partials = [
+            self.submit(_partial, empty, self.block(block), k, priority=-k)
+            for k, block in enumerate(blocks)
+        ]
+        sizes = [self.submit(_size, partial, priority=1) for partial in partials]
         # Neighbours are merged, to keep the order.
         while len(partials) > 1:
             pairs = [partials[k : k + 2] for k in range(0, len(partials), 2)]
-            partials = [self.submit(_merged, *pair) if pair[1:] else pair[0] for pair in pairs]
+            partials = [
+                self.submit(_merged, *pair, priority=1) if pair[1:] else pair[0] for pair in pairs
+            ]
         counts = self.results(sizes, "targets")
         return partials[0].result(), counts
 
@@ -170,14 +178,18 @@ class _Tasks:
         shared = self.client.submit(StyleProjection.from_bytes, projection.to_bytes(), pure=False)
         firsts = [sum(sizes[:k]) for k in range(len(sizes))]
         futures = [
-            self.submit(_styles, shared, self.block(block), first)
-            for block, first in zip(blocks, firsts, strict=True)
+            self.submit(_styles, shared, self.block(block), k, first, priority=-k)
+            for k, (block, first) in enumerate(zip(blocks, firsts, strict=True))
         ]
         return self.results(futures, "styles")
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Submits a task. Equal tasks of different fits are different, as one may be cancelled."""
-        future = self.client.submit(function, *arguments, pure=False)
+    def submit(self, function: Callable[..., Any], *arguments: Any, priority: int = 0) -> Any:
+        """Submits a task. Equal tasks of different fits are different, as one may be cancelled.
+
+        Blocks are read in their order and merged at once: of the partial fits, each of 16·N² bytes,
+        the cluster then has some for each worker and one for each level of the tree.
+        """
+        future = self.client.submit(function, *arguments, pure=False, priority=priority)
         self.submitted.append(weakref.ref(future))
         return future
 
@@ -205,14 +217,26 @@ def _read(block: Any) -> Any:
     return block() if callable(block) else block
 
 
+@contextmanager
+def _noted(index: int) -> Iterator[None]:
+    """Notes the index of a block in an exception."""
+    try:
+        yield
+    except Exception as error:
+        error.add_note(f"Raised for blocks[{index}].")
+        raise
+
+
 def _empty(first: Any, options: dict[str, Any]) -> PartialFit:
-    return PartialFit(_read(first), threads=1, **options).empty()
+    with _noted(0):
+        return PartialFit(_read(first), threads=1, **options).empty()
 
 
-def _partial(empty: PartialFit, block: Any) -> PartialFit:
+def _partial(empty: PartialFit, block: Any, index: int) -> PartialFit:
     # The argument belongs to the worker, which passes it to other tasks too.
     partial = empty.empty()
-    partial.update(_read(block))
+    with _noted(index):
+        partial.update(_read(block))
     return partial
 
 
@@ -226,5 +250,6 @@ def _merged(left: PartialFit, right: PartialFit) -> PartialFit:
     return merged
 
 
-def _styles(projection: StyleProjection, block: Any, first: int) -> BlockStyles:
-    return projection.styles(_read(block), first)
+def _styles(projection: StyleProjection, block: Any, index: int, first: int) -> BlockStyles:
+    with _noted(index):
+        return projection.styles(_read(block), first)

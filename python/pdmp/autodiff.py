@@ -126,18 +126,8 @@ def jax_rollouts(
 
     Parameters
     ----------
-    model : Model
-        Model without rotations.
-    conditions : Conditions, optional
-        Conditions of all movements that the function is not given.
-    dt : float
-        Interval between samples in s.
-    duration : float, optional
-        Length of all movements in s, by default the demonstrated one. It does not depend on `tau`.
-    derivatives : int
-        Order of the highest derivative that the function returns, as in `Model.rollouts`.
-    threads : int, optional
-        Largest number of threads, as in `Model.rollouts`.
+    model, conditions, dt, duration, derivatives, threads
+        As for `torch_rollouts`.
 
     Returns
     -------

@@ -1,10 +1,11 @@
 """Readers of recordings, and writers of movements.
 
 Each format has a function; `read` takes files and folders of any of them, and is what the command
-line uses. Readers of formats that hold one movement return a `Demonstration`, those of formats that
-hold several a dict of them by name. All have the options `columns`, `dt`, `max_gap` and `context`.
-The packages that read a format are extras, as in `pip install 'pdmp[rosbag]'`, and are imported at
-the first use.
+line uses. `read_blocks` splits more of them than memory holds into blocks for `pdmp.fit`. Readers
+of formats that hold one movement return a `Demonstration`, those of formats that hold several a
+dict of them by name. All have the options `columns`, `dt`, `max_gap` and `context`. The packages
+that read a format are extras, as in `pip install 'pdmp[rosbag]'`, and are imported at the first
+use.
 
 =============================  =================  ==============================================
 files                          extra              functions
@@ -40,7 +41,8 @@ Each layout may have `names` (D,) and `units` (D,) of the degrees of freedom.
 
 A folder has an `index.csv`, with a row per demonstration, its name in the column `id` and its
 context in others, and files `demos/<id>.csv`, or of another format with one demonstration, or a
-`demos.npz` in the order of the index. Without an index, all such files in the folder are read.
+`demos.npz` in the order of the index. Without an index, all such files in the folder are read, or
+all NPZ files if there are no others.
 
 `pdmp.preprocessing` prepares raw recordings for `pdmp.fit`.
 """
@@ -49,6 +51,7 @@ from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 if _TYPE_CHECKING:
+    from pdmp.io._blocks import read_blocks
     from pdmp.io._lerobot_writer import write_lerobot
     from pdmp.io._read import read
     from pdmp.io.bvh import read_bvh
@@ -69,6 +72,7 @@ else:
         "from_dataframe": "frames",
         "from_xarray": "labelled",
         "read": "_read",
+        "read_blocks": "_blocks",
         "read_bvh": "bvh",
         "read_c3d": "c3d",
         "read_csv": "csv",
@@ -103,6 +107,7 @@ __all__ = [
     "from_dataframe",
     "from_xarray",
     "read",
+    "read_blocks",
     "read_bvh",
     "read_c3d",
     "read_csv",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pdmp._native import Demonstration
 from pdmp.io.bvh import read_bvh
@@ -44,6 +45,23 @@ SEVERAL: dict[str, Callable[..., dict[str, Demonstration]]] = {
 """Readers of several demonstrations."""
 WITH_CONTEXTS = (read_lerobot, read_hdf5)
 """Readers that find the named contexts of each demonstration in the file."""
+
+
+class Part(NamedTuple):
+    """Demonstrations of one file, which another process can read."""
+
+    read: Callable[[], dict[str, Demonstration]]
+    is_single: bool
+    """The format holds one demonstration a file."""
+
+
+def single_part(name: str, path: Path, time: str, **options: Any) -> Part:
+    """Returns the part of a file of one demonstration."""
+    return Part(partial(_read_named, name, path, time, **options), is_single=True)
+
+
+def _read_named(name: str, path: Path, time: str, **options: Any) -> dict[str, Demonstration]:
+    return {name: read_single(path, time, **options)}
 
 
 def read_single(path: Path, time: str, **options: Any) -> Demonstration:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,16 @@ from pdmp.io._packages import load, reading
 VERSIONS = ("v3.0", "v2.1", "v2.0")
 MAX_ELEMENTS = 100_000
 """Largest number of elements of a feature with positions; images have more."""
+PLACE = ("data/chunk_index", "data/file_index")
+"""Columns with the numbers in the name of the data file of an episode, in version 3.0."""
+
+
+class Episode(NamedTuple):
+    """Number of frames, text of the first task, and file of the frames, None if unknown."""
+
+    n_frames: int
+    task: str
+    file: Path | None
 
 
 def read_info(path: Path) -> dict[str, Any]:
@@ -63,22 +73,28 @@ def _is_vector(feature: Any) -> bool:
     return numeric and sized
 
 
-def read_episodes(path: Path) -> tuple[dict[int, int], dict[int, str]]:
-    """Returns number of frames and first task of each episode."""
-    lengths, tasks = {}, {}
+def read_episodes(path: Path, files: Sequence[Path]) -> dict[int, Episode]:
+    """Returns the episodes by their index, in its order, with their files among `files`."""
+    episodes = {}
+    by_name = {"/".join(file.parts[-2:]): file for file in files}
+    by_episode = {file.name: file for file in files}
     listed = path / "meta" / "episodes.jsonl"
     for row in _json_lines(listed) if listed.exists() else _table(path / "meta" / "episodes"):
         try:
-            episode = int(row["episode_index"])
-            lengths[episode] = int(row["length"])
-            tasks[episode] = str((row.get("tasks") or [""])[0])
-        except (KeyError, TypeError, ValueError, IndexError):
+            index = int(row["episode_index"])
+            chunk, number = (row.get(name) for name in PLACE)
+            file = by_episode.get(f"episode_{index:06d}.parquet")
+            if chunk is not None and number is not None:
+                file = by_name.get(f"chunk-{int(chunk):03d}/file-{int(number):03d}.parquet")
+            task = str((row.get("tasks") or [""])[0])
+            episodes[index] = Episode(int(row["length"]), task, file)
+        except (AttributeError, LookupError, TypeError, ValueError, OverflowError):
             raise value_error(
                 f"{path}: the metadata of an episode lack episode_index, length or tasks"
             ) from None
-    if not lengths:
+    if not episodes:
         raise value_error(f"{path}: no episodes in meta")
-    return lengths, tasks
+    return dict(sorted(episodes.items()))
 
 
 def _json_lines(file: Path) -> Iterator[dict[str, Any]]:
@@ -100,7 +116,7 @@ def _table(folder: Path) -> Iterator[dict[str, Any]]:
     for file in sorted(folder.glob("*/*.parquet")):
         with reading(file, "Parquet"):
             table = parquet.ParquetFile(file)
-            names = ("episode_index", "length", "tasks")
+            names = ("episode_index", "length", "tasks", *PLACE)
             columns = [name for name in names if name in table.schema_arrow.names]
             rows = table.read(columns=columns).to_pylist()
         yield from rows
@@ -121,9 +137,8 @@ def matrix(column: Any) -> NDArray[np.float64]:
     return values.reshape(n_rows, n_elements)
 
 
-def interval(time: NDArray[np.float64], info: dict[str, Any]) -> float | None:
+def interval(time: NDArray[np.float64], fps: Any) -> float | None:
     """Returns 1/fps if the time stamps, in single precision, are its multiples, or else None."""
-    fps = info.get("fps")
     if not isinstance(fps, (int, float)) or not 0 < fps < 1e6 or not len(time):
         return None
     steps = np.round(time * fps)

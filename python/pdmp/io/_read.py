@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,10 @@ from typing import Any
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
 from pdmp.io._collections import ListedDemonstrations
-from pdmp.io._formats import SEVERAL, SINGLE, WITH_CONTEXTS, folder_reader, read_single
-from pdmp.io.folder import read_folder
+from pdmp.io._demonstration import Options
+from pdmp.io._formats import SEVERAL, SINGLE, WITH_CONTEXTS, Part, folder_reader, single_part
+from pdmp.io.folder import folder_parts
+from pdmp.io.lerobot import STATE, Episodes, open_lerobot, read_lerobot
 
 
 def read(
@@ -53,24 +56,50 @@ def read(
     OSError
         A file that cannot be read.
     """
+    parts = parts_of(path_list(paths), time, context, None, columns=columns, dt=dt, max_gap=max_gap)
     demos = ListedDemonstrations(context_names=context or ())
+    for part in parts:
+        demos += part.read().values()
+    return demos
+
+
+def path_list(paths: str | PathLike[str] | Iterable[str | PathLike[str]]) -> list[Path]:
+    """Returns one path, or several, as a list."""
     check_type("paths", paths, (str, PathLike, Iterable), "a path, or a list of them")
-    paths = [paths] if isinstance(paths, (str, PathLike)) else paths
-    options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
-    for path in map(Path, paths):
+    return [Path(path) for path in ([paths] if isinstance(paths, (str, PathLike)) else paths)]
+
+
+def parts_of(
+    paths: Iterable[Path],
+    time: str,
+    context: Sequence[str] | None,
+    features: str | Sequence[str] | None,
+    **options: Any,
+) -> Iterator[Part | Episodes]:
+    """Yields the parts of files and folders, in the order of their demonstrations.
+
+    A data set of LeRobot is one part, which can be split.
+    """
+    chosen = {} if features is None else {"features": features}
+    for path in paths:
         suffix = path.suffix.lower()
         reader = folder_reader(path) if path.is_dir() else SEVERAL.get(suffix)
-        if path.is_dir() and reader is None:
-            demos += read_folder(path, time=time, context=context, **options).values()
+        if features is not None and reader not in WITH_CONTEXTS:
+            raise value_error(
+                f"{path}: features are those of LeRobot data sets and HDF5 files: pass columns="
+            )
+        if reader is read_lerobot:
+            yield open_lerobot(path, features or STATE, Options(**options), context or [])
+        elif path.is_dir() and reader is None:
+            yield from folder_parts(path, time, context, **options)
         elif reader in WITH_CONTEXTS:
-            demos += reader(path, context=context, **options).values()
+            yield Part(partial(reader, path, context=context, **chosen, **options), False)
         elif context is not None:
             raise value_error(f"{path}: a context is read from the index.csv of a folder: pass one")
         elif reader is not None:
-            demos += reader(path, **options).values()
+            yield Part(partial(reader, path, **options), is_single=False)
         elif suffix in SINGLE:
-            demos.append(read_single(path, time, **options))
+            yield single_part(path.stem, path, time, **options)
         else:
             suffixes = ", ".join([*SINGLE, *SEVERAL])
             raise value_error(f"{path}: expected a folder or a file of one of {suffixes}")
-    return demos

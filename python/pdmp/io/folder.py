@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,10 @@ from pdmp.io import _fields
 from pdmp.io._collections import NamedDemonstrations
 from pdmp.io._csv_layout import parse_layout, read_text
 from pdmp.io._demonstration import make_demonstration
-from pdmp.io._formats import SINGLE, read_single
+from pdmp.io._formats import SINGLE, Part, single_part
 from pdmp.io.npz import read_npz, read_recordings
 
+Contexts = dict[str, list[float | str] | None]
 FORMAT = (
     "expected an index.csv with a row per demonstration and its name in the column 'id', and "
     "files demos/<id>.csv (or .bvh, .c3d, .trc, …) or a demos.npz"
@@ -37,9 +39,9 @@ def read_folder(
 ) -> dict[str, Demonstration]:
     """Reads the demonstrations that a folder's `index.csv` lists, by their ids.
 
-    Without an index, all files of the folder, or of its subfolder `demos`, that hold one
-    demonstration each, or the file `demos.npz` are read, in natural order of their names and
-    without context.
+    Without an index, the file `demos.npz` or all files of the folder, or of its subfolder `demos`,
+    that hold one demonstration each are read, in natural order of their names and without context.
+    Where there are none, all NPZ files are; `FILE/NAME` is a demonstration of several in one file.
 
     Parameters
     ----------
@@ -65,53 +67,81 @@ def read_folder(
     OSError
         A file that cannot be read.
     """
-    path = Path(path)
     options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
+    parts = folder_parts(Path(path), time, context, **options)
+    demos = NamedDemonstrations(context_names=context or ())
+    for part in parts:
+        demos.update(part.read())
+    return demos
+
+
+def folder_parts(
+    path: Path, time: str, context: Sequence[str] | None, **options: Any
+) -> list[Part]:
+    """Returns the parts of a folder, in the order of their demonstrations."""
     index, archive = path / "index.csv", path / "demos.npz"
     if not path.is_dir():
         code = errno.ENOTDIR if path.exists() else errno.ENOENT
         raise OSError(code, os.strerror(code), str(path))
     if not index.exists():
-        return _read_unlisted(path, time, context, **options)
+        return _unlisted_parts(path, time, context, **options)
     contexts = _contexts(index, context or [])
-    if not archive.exists():
-        files = {name: _file(path, name) for name in contexts}
-        return NamedDemonstrations(
-            {
-                name: read_single(file, time, context=contexts[name], **options)
-                for name, file in files.items()
-            },
-            context or (),
-        )
+    if archive.exists():
+        return [Part(partial(_read_listed, archive, contexts, **options), is_single=False)]
+    files = {name: _file(path, name) for name in contexts}
+    return [
+        single_part(name, file, time, context=contexts[name], **options)
+        for name, file in files.items()
+    ]
+
+
+def _read_listed(
+    archive: Path, contexts: Contexts, *, columns: Any, dt: Any, max_gap: float
+) -> dict[str, Demonstration]:
+    """Reads a file with all demonstrations of an index, in its order."""
     stored = list(read_recordings(archive, columns, dt))
     if len(stored) != len(contexts):
         raise value_error(
             f"{archive}: has {len(stored)} demonstrations, but index.csv lists {len(contexts)}"
         )
     recordings = zip(contexts.items(), stored, strict=True)
-    return NamedDemonstrations(
-        {
-            name: make_demonstration(
-                f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
-            )
-            for (name, values), (_, position, arguments) in recordings
-        },
-        context or (),
-    )
+    return {
+        name: make_demonstration(
+            f"{archive}, '{name}'", position, max_gap=max_gap, context=values, **arguments
+        )
+        for (name, values), (_, position, arguments) in recordings
+    }
 
 
-def _read_unlisted(
+def _unlisted_parts(
     path: Path, time: str, context: Sequence[str] | None, **options: Any
-) -> dict[str, Demonstration]:
-    """Reads all files of a folder without an index."""
-    if context is None and (path / "demos.npz").exists():
-        return read_npz(path / "demos.npz", **options)
-    for folder in (path, path / "demos"):
-        files = [file for file in folder.glob("*") if file.suffix.lower() in SINGLE]
-        if files and context is None:
-            files.sort(key=lambda file: _natural(file.name))
-            return {file.stem: read_single(file, time, **options) for file in files}
+) -> list[Part]:
+    """Returns the parts of a folder without an index."""
+    if context is None:
+        archive = path / "demos.npz"
+        if archive.exists():
+            return [Part(partial(read_npz, archive, **options), is_single=False)]
+        if files := _files(path, SINGLE):
+            parts = {file.stem: single_part(file.stem, file, time, **options) for file in files}
+            return list(parts.values())
+        if files := _files(path, [".npz"]):
+            return [Part(partial(_read_npz, file, **options), is_single=False) for file in files]
     raise value_error(f"{path}: no index.csv{'' if context else ', and no files'}: {FORMAT}")
+
+
+def _files(path: Path, suffixes: Container[str]) -> list[Path]:
+    """Returns the files with some suffixes in a folder or else in `demos`, in natural order."""
+    for folder in (path, path / "demos"):
+        if files := [file for file in folder.glob("*") if file.suffix.lower() in suffixes]:
+            return sorted(files, key=lambda file: _natural(file.name))
+    return []
+
+
+def _read_npz(path: Path, **options: Any) -> dict[str, Demonstration]:
+    """Reads one of several NPZ files."""
+    demos = read_npz(path, **options)
+    is_one = len(demos) == 1
+    return {path.stem if is_one else f"{path.stem}/{name}": each for name, each in demos.items()}
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
@@ -130,7 +160,7 @@ def _file(path: Path, name: str) -> Path:
     return next((path for path in paths if path.exists()), paths[0])
 
 
-def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str] | None]:
+def _contexts(path: Path, columns: Sequence[str]) -> Contexts:
     """Returns the context of each id in an index; a column without numbers has labels."""
     table = parse_layout(path, read_text(path), index=True)
     header, lines = [split_label(field)[0] for field in table.fields], list(table.rows())
@@ -141,7 +171,7 @@ def _contexts(path: Path, columns: Sequence[str]) -> dict[str, list[float | str]
     if not lines:
         raise value_error(f"{path}: lists no demonstrations: {FORMAT}")
     labels = {k for k in indices if not any(_fields.is_number(fields[k]) for _, fields in lines)}
-    contexts: dict[str, list[float | str] | None] = {}
+    contexts: Contexts = {}
     for line, fields in lines:
         if fields[name] in contexts:
             raise value_error(f"{path}, line {line}: id '{fields[name]}' appears twice: rename one")
