@@ -66,12 +66,14 @@ def test_function_of_blocks_gives_the_model_of_all(noise: float) -> None:
     assert_equal(pdmp.fit(lambda: (tuple(block) for block in blocks_of(demos, 5))), whole)
 
 
-def test_arrays_are_blocks() -> None:
-    """Arrays (B, T, D) are blocks."""
+def test_arrays_and_functions_are_blocks() -> None:
+    """Arrays (B, T, D) are blocks, and functions that return one."""
     demos = np.random.default_rng(2).normal(size=(12, 160, 2)).cumsum(axis=1)
-    model = pdmp.fit([demos[:5], demos[5:]], dt=0.01, smoothing=None)
     whole = pdmp.fit(demos, dt=0.01, smoothing=None)
-    np.testing.assert_allclose(model.styles, whole.styles, rtol=0, atol=1e-9)
+    parts = [demos[:5], demos[5:]]
+    for blocks in (parts, [partial(np.copy, part) for part in parts]):
+        model = pdmp.fit(blocks, dt=0.01, smoothing=None)
+        np.testing.assert_allclose(model.styles, whole.styles, rtol=0, atol=1e-9)
 
 
 def test_partial_fits_are_added_to(tmp_path: Path) -> None:

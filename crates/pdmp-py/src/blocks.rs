@@ -46,6 +46,7 @@ impl Blocks {
                 Err(error) => Some(Err(error)),
                 Ok(blocks) => Python::attach(|py| {
                     let block = blocks.bind(py).clone().next()?;
+                    let block = block.and_then(|block| if block.is_callable() { block.call0() } else { Ok(block) });
                     let block = block.and_then(|block| demonstrations(&format!("block {index}"), &block));
                     index += 1;
                     iterator = block.is_ok().then_some(Ok(blocks));
@@ -70,7 +71,8 @@ impl Blocks {
     }
 }
 
-/// Returns whether an item of a list is a block of demonstrations: a list of them, or an array (B, T, D).
+/// Returns whether an item of a list is a block of demonstrations: a list of them, an array (B, T, D), or a function that
+/// returns one.
 fn is_block(item: &Bound<'_, PyAny>) -> bool {
     let is_list = item.is_instance_of::<PyList>() || item.is_instance_of::<PyTuple>();
     if is_list {
@@ -78,7 +80,7 @@ fn is_block(item: &Bound<'_, PyAny>) -> bool {
             .get_item(0)
             .is_ok_and(|first| first.is_instance_of::<Demonstration>() || dimensions(&first) == Some(2));
     }
-    dimensions(item) == Some(3)
+    item.is_callable() || dimensions(item) == Some(3)
 }
 
 fn dimensions(item: &Bound<'_, PyAny>) -> Option<usize> {
