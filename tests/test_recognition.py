@@ -117,6 +117,39 @@ def test_a_prior_is_the_same_after_a_pickle(model, prior):
     assert prior.residual.shape == (2,)
 
 
+def test_a_model_file_keeps_the_prior(model, demos, prior, tmp_path):
+    """Model and prior are read from one file; a model alone, and a damaged file, have no prior."""
+    path = tmp_path / "reach.safetensors"
+    model.save(path, prior=prior)
+    loaded, same = pdmp.load(path), pdmp.Prior.load(path)
+    assert repr(same) == repr(prior)
+    a = watched(model.recogniser(prior), reach(0.3), 20).estimate()
+    b = watched(loaded.recogniser(same), reach(0.3), 20).estimate()
+    np.testing.assert_array_equal(a.goal, b.goal)
+    np.testing.assert_array_equal(a.goal_deviation, b.goal_deviation)
+    data = model.to_bytes(prior=prior)
+    assert data == path.read_bytes() == loaded.to_bytes(prior=pdmp.Prior.from_bytes(data))
+    assert pdmp.Model.from_bytes(data).to_bytes() == model.to_bytes() == loaded.to_bytes()
+
+    with pytest.raises(pdmp.ModelFileError, match="no prior"):
+        pdmp.Prior.from_bytes(model.to_bytes())
+    damaged = bytearray(data)
+    damaged[-9] ^= 1
+    for read in (pdmp.Prior.from_bytes, pdmp.Model.from_bytes):
+        with pytest.raises(pdmp.ModelFileError):
+            read(bytes(damaged))
+        with pytest.raises(pdmp.ModelFileError):
+            read(data[:-9])
+    with pytest.raises(FileNotFoundError, match="absent"):
+        pdmp.Prior.load(tmp_path / "absent.safetensors")
+    with pytest.raises(TypeError, match=r"prior.*expected pdmp\.Prior"):
+        model.save(path, prior=model)
+    other = pdmp.fit([demo.position[:, :1] for demo in demos], dt=0.01)
+    with pytest.raises(ValueError, match="another model"):
+        other.save(path, prior=prior)
+    assert path.read_bytes() == data
+
+
 def test_groups_of_people_are_names(model, demos):
     """Groups are any names, at least two."""
     prior = model.prior(demos, groups=["a", "b", "c"] * 4)

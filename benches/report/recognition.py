@@ -216,6 +216,9 @@ take the duration of the held-out movement itself, an advantage over the others.
 demonstration is that with the smallest squared distance so far. The mean movement has the mean
 duration. Coverage is that of bands of 90 %. Left out are tenths of the demonstrations, or all
 of one person, where the prior is learnt with `groups`.
+
+[A how-to](howto/recognition.md) shows the calls: learn a prior, keep it in the file of the model,
+and recognise a movement in Python, Rust, C or C++.
 """
 
 

@@ -5,7 +5,7 @@ use super::estimate::{Estimate, MIN_WEIGHT};
 use super::evidence::{Belief, Kernels, Scratch};
 use super::movement_table::MovementTable;
 use super::noise_filter::NoiseFilter;
-use super::prior::{Moments, Prior, frame_size};
+use super::prior::{Moments, Prior};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::Model;
@@ -133,12 +133,7 @@ impl Recogniser {
 
     /// Creates a recogniser as [`Self::new`] does, with a number of hypotheses of the duration.
     pub(crate) fn with_durations(model: &Model, prior: &Prior, timing: Timing, n_durations: usize) -> Result<Self> {
-        let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
-        let same = prior.kind() == model.kind() && prior.residual().len() == model.n_dofs();
-        if !same || prior.parameters().ncols() != n_parameters {
-            let problem = "is of another model: its kind, styles or degrees of freedom differ";
-            return Err(Error::Argument { name: "prior", problem });
-        }
+        prior.check_model(model)?;
         check_linear(model)?;
         let moments = prior.moments();
         let table = MovementTable::new(model.primitive(), prior, &moments)?;
@@ -269,7 +264,7 @@ impl Recogniser {
             belief.update(information, hypothesis.log, &self.kernels, &mut self.scratch);
         }
         let largest = self.beliefs.iter().map(|belief| belief.weight).fold(f64::NEG_INFINITY, f64::max);
-        if !largest.is_finite() {
+        if !largest.is_finite() || self.beliefs.iter().any(|belief| belief.weight.is_nan()) {
             let problem = "are too far from the demonstrations: check their units";
             return Err(Error::Argument { name: "observations", problem });
         }
