@@ -12,9 +12,11 @@ use std::process::{Command as Process, Output};
 
 use common::*;
 use ndarray::Array2;
+use pdmp_core::learning::learn_prior;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::motion::{Limits, TimeGrid};
+use pdmp_core::numerics::Threads;
 use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status, rollout};
 use tempfile::TempDir;
 
@@ -250,7 +252,9 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
         rows.iter().flatten().map(|number| number.to_bits()).collect()
     }));
 
-    let folder = saved(&model, "reach.safetensors");
+    let folder = tempfile::tempdir().unwrap();
+    let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
+    prior.save(&model, &folder.path().join("reach.safetensors")).unwrap();
     let source = root().join("crates/pdmp-capi/tests/wrapper.cpp");
     for printed in outputs(CPP, &source, folder.path(), &["reach.safetensors"]) {
         assert_eq!(bits(&printed, 0), expected);

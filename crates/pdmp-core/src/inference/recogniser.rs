@@ -113,7 +113,7 @@ pub struct Recogniser {
     pub(crate) information: Vec<f64>,
     pub(crate) beliefs: Vec<Belief>,
     pub(crate) scratch: Scratch,
-    row: Vec<f64>,
+    pub(crate) row: Vec<f64>,
     /// Times of the first and the last observation, in seconds.
     pub(crate) times: Option<[f64; 2]>,
     /// Number of observed positions.
@@ -158,11 +158,11 @@ impl Recogniser {
         })
     }
 
-    /// Forgets all observations.
+    /// Forgets all observations. Does not allocate.
     pub fn reset(&mut self) {
         let Self { processes, information, .. } = self;
         processes.iter_mut().chain(information).for_each(|value| *value = 0.0);
-        self.noise = NoiseFilter::new(self.prior.residual(), self.prior.settings().correlation_time);
+        self.noise.restart();
         (self.times, self.n_observed, self.stage) = (None, 0, Stage::Observed);
     }
 
