@@ -78,11 +78,10 @@ impl pdmp_point {
     /// # Safety
     /// Every pointer is NULL or valid for reads, over its length.
     unsafe fn get(&self, model: &Model) -> Result<ViaPoint, Fault> {
-        let dofs = match length_of(self.dofs, self.n_dofs, "dofs")? {
+        let dofs = length_of(self.dofs, self.n_dofs, "dofs")?.map(|length| {
             // SAFETY: `dofs` is not NULL, so the caller guarantees `length` readable numbers.
-            Some(length) => Some(unsafe { slice::from_raw_parts(self.dofs, length) }.to_vec()),
-            None => None,
-        };
+            unsafe { slice::from_raw_parts(self.dofs, length) }.to_vec()
+        });
         let expected = dofs.as_ref().map_or(model.n_coordinates(), Vec::len);
         let per = if dofs.is_some() { "element of dofs" } else { per_coordinate(model) };
         // SAFETY: this function has the same contract for every vector.
