@@ -105,6 +105,29 @@ def test_the_estimate_depends_on_time_differences_alone(model, prior):
     assert a.arrival == pytest.approx(b.arrival - 100.0, rel=1e-6)
 
 
+def test_a_partner_that_is_not_seen_follows_from_the_other():
+    """Half of a movement of one of two partners gives the goal of the other, with a wider band."""
+    rng = np.random.default_rng(2)
+    ends = rng.uniform([0.1, 0.4, 0.8], [0.5, 0.8, 1.2], (13, 3)).tolist()
+
+    def pair(height, goal, duration):
+        one = reach(height, goal, duration)
+        return pdmp.Demonstration(np.hstack([one.position, 1 - 0.7 * one.position]), time=one.time)
+
+    *pairs, new = [pair(*each) for each in ends]
+    model = pdmp.fit(pairs)
+    prior = model.prior(pairs)
+    alone, together = model.recogniser(prior), model.recogniser(prior)
+    for time, position in zip(new.time[:31], new.position, strict=False):
+        alone.update(time, [*position[:2], np.nan, np.nan])
+        together.update(time, position)
+    estimate = alone.estimate()
+    assert np.abs(estimate.goal - new.position[-1]).max() < 0.05
+    assert (estimate.goal_deviation[2:] >= together.estimate().goal_deviation[2:]).all()
+    ahead = alone.continuation(new.time[31:])
+    assert np.abs(ahead.position - new.position[31:]).max() < 0.08
+
+
 def test_a_prior_is_the_same_after_a_pickle(model, prior):
     """A pickled prior gives the same estimates, bit for bit."""
     same = pickle.loads(pickle.dumps(prior))

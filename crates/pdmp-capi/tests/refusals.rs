@@ -946,6 +946,94 @@ fn points_that_no_movement_passes_are_refused() {
     assert_eq!(passage(&model, &[valid], Some(&anchored), None).err().unwrap().0, PDMP_ABSENT);
 }
 
+/// Points of extreme numbers are refused with a message, or their movement has finite numbers.
+#[test]
+fn random_points_are_refused_or_passed_in_finite_numbers() {
+    const NUMBERS: [f64; 16] = [
+        0.0,
+        -0.5,
+        0.3,
+        0.5,
+        0.8,
+        1.0,
+        1e-300,
+        1e-9,
+        1e-3,
+        30.0,
+        1e9,
+        -1e100,
+        1e150,
+        f64::MAX,
+        f64::INFINITY,
+        f64::NAN,
+    ];
+    let mut random = random::Random(6);
+    let mut below = |n: usize| (random.next() * n as f64) as usize;
+    let mut accepted = 0;
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let model = loaded(kind);
+        let n = info(&model).n_dofs;
+        for _ in 0..1500 {
+            let mut number = |rarely: usize| {
+                let n_choices = if below(rarely) == 0 { NUMBERS.len() } else { 6 };
+                NUMBERS[below(n_choices)]
+            };
+            let numbers: Vec<f64> = (0..4 * n + 4).map(|k| number(if k < 4 { 4 } else { 20 })).collect();
+            let [time, phase, deviation, tolerance] = [0, 1, 2, 3].map(|k| &numbers[k]);
+            let dofs: Vec<usize> = (0..below(n + 1)).map(|_| below(n + 1)).collect();
+            let count = if dofs.is_empty() { n } else { dofs.len() };
+            let either = |given: bool, number| if given { number } else { ptr::null() };
+            let points: Vec<pdmp_point> = (0..=below(2))
+                .map(|k| pdmp_point {
+                    time: either(below(3) > 0, time),
+                    phase: either(below(3) == 0, phase),
+                    position: if below(5) > 0 { vector(&numbers[4 + k * n..][..count]) } else { NO_VECTOR },
+                    velocity: if below(3) == 0 { vector(&numbers[4 + 2 * n..][..count]) } else { NO_VECTOR },
+                    dofs: if dofs.is_empty() { ptr::null() } else { dofs.as_ptr() },
+                    n_dofs: dofs.len(),
+                    tolerance: if below(3) == 0 { *tolerance } else { 0.0 },
+                })
+                .collect();
+            let conditions = pdmp_conditions {
+                start: if below(4) == 0 { vector(&numbers[4 + 3 * n..]) } else { NO_VECTOR },
+                tau: either(below(4) == 0, phase),
+                ..NO_CONDITIONS
+            };
+            let options = pdmp_passage_options {
+                context: NO_VECTOR,
+                from_phase: either(below(4) == 0, time),
+                deviation: either(below(4) == 0, deviation),
+            };
+            let passed = match passage(&model, &points, Some(&conditions), Some(&options)) {
+                Ok(passed) => passed,
+                Err((status, text)) => {
+                    assert!(matches!(status, PDMP_RANGE | PDMP_ABSENT) && !text.is_empty(), "{status:?} {text}");
+                    continue;
+                }
+            };
+            let found = describe(&passed);
+            // SAFETY: the vector points into the passage.
+            let displacement =
+                unsafe { std::slice::from_raw_parts(found.displacement.data, found.displacement.length) };
+            assert!(found.distance.is_finite() && displacement.iter().all(|x| x.is_finite()), "{found:?} {points:?}");
+            let (status, controller, text) = start(&model, &SETTINGS, Some(&found.conditions));
+            if status != PDMP_OK {
+                assert!(controller.is_null() && !text.is_empty(), "{status:?} {text}");
+                continue;
+            }
+            let mut running = Running(controller);
+            for _ in 0..20 {
+                if (pdmp_controller_step(running.handle()) as i32) < 0 {
+                    break;
+                }
+            }
+            assert!(running.state(n).iter().all(|x| x.is_finite()), "{found:?} {points:?}");
+            accepted += 1;
+        }
+    }
+    assert!(accepted > 200, "{accepted}");
+}
+
 #[test]
 fn bad_observations_are_refused_with_a_message() {
     let demos = reaches();
