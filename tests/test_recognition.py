@@ -105,6 +105,29 @@ def test_the_estimate_depends_on_time_differences_alone(model, prior):
     assert a.arrival == pytest.approx(b.arrival - 100.0, rel=1e-6)
 
 
+def test_a_partner_that_is_not_seen_follows_from_the_other():
+    """Half of a movement of one of two partners gives the goal of the other, with a wider band."""
+    rng = np.random.default_rng(2)
+    ends = rng.uniform([0.1, 0.4, 0.8], [0.5, 0.8, 1.2], (13, 3)).tolist()
+
+    def pair(height, goal, duration):
+        one = reach(height, goal, duration)
+        return pdmp.Demonstration(np.hstack([one.position, 1 - 0.7 * one.position]), time=one.time)
+
+    *pairs, new = [pair(*each) for each in ends]
+    model = pdmp.fit(pairs)
+    prior = model.prior(pairs)
+    alone, together = model.recogniser(prior), model.recogniser(prior)
+    for time, position in zip(new.time[:31], new.position, strict=False):
+        alone.update(time, [*position[:2], np.nan, np.nan])
+        together.update(time, position)
+    estimate = alone.estimate()
+    assert np.abs(estimate.goal - new.position[-1]).max() < 0.05
+    assert (estimate.goal_deviation[2:] >= together.estimate().goal_deviation[2:]).all()
+    ahead = alone.continuation(new.time[31:])
+    assert np.abs(ahead.position - new.position[31:]).max() < 0.08
+
+
 def test_a_prior_is_the_same_after_a_pickle(model, prior):
     """A pickled prior gives the same estimates, bit for bit."""
     same = pickle.loads(pickle.dumps(prior))
@@ -115,6 +138,39 @@ def test_a_prior_is_the_same_after_a_pickle(model, prior):
     np.testing.assert_array_equal(a.goal_deviation, b.goal_deviation)
     assert 0 < prior.bandwidth <= 1 and 0 < prior.tempering <= 1 and prior.correlation_time > 0
     assert prior.residual.shape == (2,)
+
+
+def test_a_model_file_keeps_the_prior(model, demos, prior, tmp_path):
+    """Model and prior are read from one file; a model alone, and a damaged file, have no prior."""
+    path = tmp_path / "reach.safetensors"
+    model.save(path, prior=prior)
+    loaded, same = pdmp.load(path), pdmp.Prior.load(path)
+    assert repr(same) == repr(prior)
+    a = watched(model.recogniser(prior), reach(0.3), 20).estimate()
+    b = watched(loaded.recogniser(same), reach(0.3), 20).estimate()
+    np.testing.assert_array_equal(a.goal, b.goal)
+    np.testing.assert_array_equal(a.goal_deviation, b.goal_deviation)
+    data = model.to_bytes(prior=prior)
+    assert data == path.read_bytes() == loaded.to_bytes(prior=pdmp.Prior.from_bytes(data))
+    assert pdmp.Model.from_bytes(data).to_bytes() == model.to_bytes() == loaded.to_bytes()
+
+    with pytest.raises(pdmp.ModelFileError, match="no prior"):
+        pdmp.Prior.from_bytes(model.to_bytes())
+    damaged = bytearray(data)
+    damaged[-9] ^= 1
+    for read in (pdmp.Prior.from_bytes, pdmp.Model.from_bytes):
+        with pytest.raises(pdmp.ModelFileError):
+            read(bytes(damaged))
+        with pytest.raises(pdmp.ModelFileError):
+            read(data[:-9])
+    with pytest.raises(FileNotFoundError, match="absent"):
+        pdmp.Prior.load(tmp_path / "absent.safetensors")
+    with pytest.raises(TypeError, match=r"prior.*expected pdmp\.Prior"):
+        model.save(path, prior=model)
+    other = pdmp.fit([demo.position[:, :1] for demo in demos], dt=0.01)
+    with pytest.raises(ValueError, match="another model"):
+        other.save(path, prior=prior)
+    assert path.read_bytes() == data
 
 
 def test_groups_of_people_are_names(model, demos):

@@ -155,7 +155,7 @@ class Simple:
     def predict(self, time: np.ndarray, seen: np.ndarray, duration: float) -> list[np.ndarray]:
         """Returns the rest of a movement (T - n, D) by each predictor."""
         n, phases = len(seen), time / duration
-        distances = [np.sum((at(demo, phases[:n]) - seen) ** 2) for demo in self.demos]
+        distances = [np.nansum((at(demo, phases[:n]) - seen) ** 2) for demo in self.demos]
         mean = self.demos.mean(axis=0)
         nearest = at(self.demos[np.argmin(distances)], phases[n:])
         gaussian = self.gaussian(phases, seen)
@@ -222,6 +222,9 @@ duration. The ProMP is a Gaussian over the weights of 20 radial basis functions 
 freedom, by ridge regression, conditioned on every sample with a standard deviation of 1 % of the
 range. Coverage is that of bands of 90 %. Left out are tenths of the demonstrations, or all of one
 person, where the prior is learnt with `groups`.
+
+[A how-to](howto/recognition.md) shows the calls: learn a prior, keep it in the file of the model,
+and recognise a movement in Python, Rust, C or C++.
 """
 
 
@@ -258,6 +261,8 @@ def times() -> str:
 
 def main() -> None:
     """Evaluates every set that is available."""
+    from report import partners  # which uses the predictors above
+
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--write", action="store_true", help="write docs/recognition.md")
     arguments.add_argument("--most", type=int, default=20, help="movements of each set and split")
@@ -274,7 +279,8 @@ def main() -> None:
             section = f"{title}\n\n{table(scores)}\n"
             print(section, flush=True)
             sections.append(section)
-    if len(sections) == 2:
+    sections.append(partners.section())
+    if len(sections) == 3:
         raise SystemExit("no recordings: set PDMP_DATA to a folder with sets of them")
     if options.write:
         (ROOT / "docs" / "recognition.md").write_text("\n".join(sections), encoding="utf-8")

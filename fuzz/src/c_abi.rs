@@ -424,6 +424,7 @@ impl Conditions {
     fn get(&self) -> pdmp_conditions {
         let [style, goal, anchor, start, velocity, goal_velocity] = self.vectors.each_ref().map(Numbers::vector);
         let [amplitude, tau, phase] = [&self.amplitude, &self.tau, &self.phase].map(pointer);
-        pdmp_conditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau, phase }
+        let forcing = ptr::null();
+        pdmp_conditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau, phase, forcing }
     }
 }

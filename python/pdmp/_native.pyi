@@ -1967,7 +1967,7 @@ class Model:
         True
         >>> rest = model.rollout(dt=0.01, conditions=estimate.conditions)
         """
-    def save(self, path: str | PathLike[str]) -> None:
+    def save(self, path: str | PathLike[str], *, prior: Prior | None = None) -> None:
         """Writes a model file.
 
         The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
@@ -1977,11 +1977,15 @@ class Model:
         ----------
         path : path-like
             File to write, conventionally with the suffix `.safetensors`.
+        prior : Prior, optional
+            Prior that the file keeps with the model, from `Model.prior`; `Prior.load` reads it.
 
         Raises
         ------
         OSError
             The file cannot be written, or its folder does not exist.
+        ValueError
+            The prior is of another model.
 
         Examples
         --------
@@ -1989,6 +1993,9 @@ class Model:
         >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
         >>> model.save(path)
         >>> path.exists()
+        True
+        >>> model.save(path, prior=model.prior(demos))
+        >>> len(pdmp.Prior.load(path).parameters) == model.n_demos
         True
         """
     def fastest_tau(
@@ -2199,8 +2206,19 @@ class Model:
         >>> np.allclose(controller.position, [1.1, 0.0], atol=0.01)
         True
         """
-    def to_bytes(self) -> bytes:
-        """Returns the contents of a model file as bytes."""
+    def to_bytes(self, *, prior: Prior | None = None) -> bytes:
+        """Returns the contents of a model file as bytes.
+
+        Parameters
+        ----------
+        prior : Prior, optional
+            Prior that the file keeps with the model, as for `save`.
+
+        Raises
+        ------
+        ValueError
+            The prior is of another model.
+        """
     @staticmethod
     def from_bytes(data: bytes) -> Model:
         """Reads a model from the contents of a model file.
@@ -2734,8 +2752,53 @@ class Prior:
 
         p(θ, log T) = 1/M Σₘ N(μ + √(1−c²)(θₘ − μ), c²Σ)
 
-    Priors are immutable and can be pickled.
+    Priors are immutable and can be pickled. `Model.save` keeps a prior in the file of its model.
     """
+    @staticmethod
+    def load(path: str | PathLike[str]) -> Prior:
+        """Reads the prior that `Model.save` has written into the file of its model.
+
+        Parameters
+        ----------
+        path : path-like
+            A model file; `pdmp.load` reads the model from it.
+
+        Returns
+        -------
+        Prior
+
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        ModelFileError
+            The file is damaged, not a model, without a prior, or of another version.
+
+        Examples
+        --------
+        >>> import tempfile, pathlib
+        >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
+        >>> model.save(path, prior=model.prior(demos))
+        >>> recogniser = pdmp.load(path).recogniser(pdmp.Prior.load(path))
+        """
+    @staticmethod
+    def from_bytes(data: bytes) -> Prior:
+        """Reads the prior from the contents of a model file.
+
+        Parameters
+        ----------
+        data : bytes
+            Result of `Model.to_bytes` with a prior, or the contents of a file.
+
+        Returns
+        -------
+        Prior
+
+        Raises
+        ------
+        ModelFileError
+            The data are damaged, not a model, without a prior, or of another version.
+        """
     @property
     def parameters(self) -> _Array:  # (M, K)
         """Parameters (M, K) of the demonstrations: style, goal and start, or style and anchor."""

@@ -1,22 +1,25 @@
-// Parametric dynamic movement primitives: loading of models and their execution in a control loop.
+// Parametric dynamic movement primitives: loading of models, their execution in a control loop, movements through points, and
+// recognition of movements.
 //
 // - Status: a call that can fail returns a pdmp_status; negative values are errors. A call that fails changes nothing
 //   but the error message and an output handle, which becomes NULL; after PDMP_INTERNAL the state is unspecified. The
 //   error message names the argument, its value and the values allowed.
-// - Error messages: a call with an argument `error` writes its message there; the message of a call on a controller is
-//   read with pdmp_controller_error. A call on a NULL controller leaves no message.
+// - Error messages: a call with an argument `error` writes its message there; the message of a call on a controller or a
+//   recogniser is read with pdmp_controller_error or pdmp_recogniser_error. A call on a NULL one leaves no message.
 // - NULL: an optional argument may be NULL, or {NULL, 0} for a pair of pointer and length. A zero-initialised struct
 //   holds only optional members that are not given, except pdmp_settings.dt. Any other NULL is the error PDMP_NULL.
 // - Pointers: a pointer that is not NULL must be valid, an array over the length that accompanies it. Buffers may not
 //   overlap with other arguments, except those of a pdmp_motion with the arrays of a pdmp_command.
 // - Ownership: the caller owns all arrays and structs, and the library keeps no pointer to them after the call, except
-//   to pdmp_settings.memory and to the memory of a pdmp_controller_clone. pdmp_model_free and pdmp_controller_free
-//   release what the library has created. Strings that a call returns belong to the model or are static.
+//   to pdmp_settings.memory and to the memory of a pdmp_controller_clone. pdmp_model_free, pdmp_controller_free,
+//   pdmp_passage_free and pdmp_recogniser_free release what the library has created. Strings that a call returns belong to the
+//   model or are static.
 // - Lengths: n_dofs, n_styles, n_contexts and n_conditions are members of pdmp_info. Numbers are counted in elements,
 //   text and memory in bytes. All numbers are double precision, all strings UTF-8.
-// - Threads: any number of threads may use a model; one thread at a time may use a controller.
+// - Threads: any number of threads may use a model or a passage; one thread at a time may use a controller or a recogniser.
 // - Real time: pdmp_controller_step, _update, _set_..., _release, _copy, _read, _limited, _progress
-//   and _error, pdmp_absolute_relative and pdmp_left_right neither allocate nor lock.
+//   and _error, pdmp_recogniser_update, _estimate, _continuation, _reset and _error, pdmp_absolute_relative and
+//   pdmp_left_right neither allocate nor lock.
 // - ABI: structs may grow between minor versions before 1.0; recompile for each.
 //
 // Link with -lpdmp; the static library also needs -lpthread -ldl -lm. pdmp.hpp is a C++17 wrapper.
@@ -84,6 +87,12 @@ typedef struct pdmp_controller pdmp_controller;
 /// Learnt primitive. It is immutable, and threads may share it.
 typedef struct pdmp_model pdmp_model;
 
+/// Movement through points: its conditions and its additional forcing. It is immutable, and threads may share it.
+typedef struct pdmp_passage pdmp_passage;
+
+/// Filter that estimates a movement while it is observed. One thread at a time may use it.
+typedef struct pdmp_recogniser pdmp_recogniser;
+
 /// Writable buffer for a UTF-8 string, owned by the caller; `{NULL, 0}` if the string is not needed. A longer string is
 /// truncated between characters; the result ends in a zero byte whenever `size` > 0.
 typedef struct {
@@ -146,6 +155,8 @@ typedef struct {
     const double *tau;
     /// Phase phi, in rad, at which the movement starts on its limit cycle; 0 by default; rhythmic models only.
     const double *phase;
+    /// Additional forcing of a movement through points, see pdmp_model_through; none by default.
+    const pdmp_passage *forcing;
 } pdmp_conditions;
 
 /// Writable array of numbers, owned by the caller; `{NULL, 0}` if the output is not needed. Elements beyond those that
@@ -245,6 +256,86 @@ typedef struct {
     /// Otherwise every DoF is limited on its own.
     int independent;
 } pdmp_limits;
+
+/// Point that a movement passes at a time or a phase, one of which is given.
+typedef struct {
+    /// Time since the start of the movement, in seconds, at the tau of the conditions.
+    const double *time;
+    /// Phase x of a discrete movement, or phi in rad of a rhythmic one, as from pdmp_controller_progress.
+    const double *phase;
+    /// Position, one number for each of `dofs`; not given for a velocity alone.
+    pdmp_vector position;
+    /// Velocity per second, one number for each of `dofs`; not given for a position alone.
+    pdmp_vector velocity;
+    /// Degrees of freedom, or coordinates of a model with rotations, counted from 0; NULL for all of them.
+    const size_t *dofs;
+    /// Number of elements of `dofs`.
+    size_t n_dofs;
+    /// Standard deviation of the position relative to the range of each DoF; 0 is a point that is passed exactly.
+    double tolerance;
+} pdmp_point;
+
+/// Options of pdmp_model_through.
+typedef struct {
+    /// Context (n_contexts) whose prediction supplies mean and covariance of the conditions; those of the demonstrations by
+    /// default.
+    pdmp_vector context;
+    /// Phase from which on a movement that is under way under the conditions departs from them, as from
+    /// pdmp_controller_progress. All conditions then remain, and the additional forcing alone leads it through the points.
+    const double *from_phase;
+    /// Standard deviation of the additional displacement relative to the ranges, 0.03 by default. With 0 the conditions carry
+    /// all that they can, and the additional forcing the least.
+    const double *deviation;
+} pdmp_passage_options;
+
+/// Properties of a movement through points.
+typedef struct {
+    /// Conditions of the movement, for pdmp_controller_new, _reset and pdmp_model_rollout.
+    pdmp_conditions conditions;
+    /// Mahalanobis distance of the points from the movements of the demonstrators.
+    double distance;
+    /// Number of positions and velocities.
+    size_t n_constraints;
+    /// 1 if the points lie farther from the demonstrations than 999 of 1000 movements of the demonstrators would, otherwise 0.
+    int far;
+    /// Largest displacement (n_dofs) by the additional forcing, relative to the ranges.
+    pdmp_vector displacement;
+} pdmp_passage_info;
+
+/// Knowledge of the time of a movement that is observed.
+typedef struct {
+    /// Earliest start of a discrete movement, in seconds from the first observation; negative for one that is joined on its way.
+    /// Until it starts, it rests. With 0 for both it starts with the first observation. A rhythmic movement is joined at any phase.
+    double earliest;
+    /// Latest start.
+    double latest;
+    /// Duration or period, in seconds; NULL if it is not known.
+    const double *duration;
+} pdmp_timing;
+
+/// Estimate of a movement from a part of it. Standard deviations are scaled so that 90 % of held-out demonstrations lie within
+/// 1.645 of them.
+typedef struct {
+    /// Conditions of the whole movement: style, goal and start, or anchor and present phase, and tau.
+    pdmp_conditions conditions;
+    /// Standard deviations (n_styles) of the style.
+    pdmp_vector style_deviation;
+    /// Standard deviations (n_dofs) of the goal or anchor.
+    pdmp_vector goal_deviation;
+    /// Duration or period, in seconds.
+    double duration;
+    /// Standard deviation of the logarithm of the duration.
+    double duration_deviation;
+    /// Time of arrival at the goal, in seconds on the clock of the observations; that of the end of the cycle if rhythmic.
+    double arrival;
+    /// Fraction of the movement at the last observation; of the cycle, in [0, 1), for a rhythmic one.
+    double fraction;
+    /// Standard deviation of `fraction`.
+    double fraction_deviation;
+    /// Mean squared residual, relative to that which one in ten held-out demonstrations exceeds. Above 1 the movement is unlike the
+    /// demonstrations, or pauses.
+    double surprise;
+} pdmp_estimate;
 
 #ifdef __cplusplus
 extern "C" {
@@ -518,6 +609,102 @@ pdmp_status pdmp_controller_forecast(pdmp_controller *controller,
                                      double dt,
                                      size_t n_samples,
                                      const pdmp_motion *motion);
+
+/// Computes the most probable movement through `n_points` points.
+///
+/// `conditions` may be NULL or have some members: they remain, and the others follow from the demonstrations or the context. The
+/// result is the mean given the points of movements y(u) = Phi(u) theta + delta(u), with style, goal and start theta, or style and
+/// anchor, as scattered as those of the demonstrations, and an additional displacement delta. Points without tolerance are passed to
+/// 1e-9 of the range; a rhythmic movement passes them on its limit cycle, in every period. `options` may be NULL.
+///
+/// `*passage` is set to the new passage, which the caller frees with pdmp_passage_free, or to NULL on error.
+///
+/// This function allocates. Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE for no point, one outside of the movement or before
+/// `from_phase`, a number that is not finite, points that contradict each other or the conditions, or more than 500 numbers;
+/// PDMP_ABSENT if a condition does not apply to the kind of model, or for a context if the model was fitted without contexts.
+pdmp_status pdmp_model_through(const pdmp_model *model,
+                               const pdmp_point *points,
+                               size_t n_points,
+                               const pdmp_conditions *conditions,
+                               const pdmp_passage_options *options,
+                               pdmp_passage **passage,
+                               pdmp_text error);
+
+/// Writes the properties of a movement through points to `info`. Its members point into the passage, which must outlive their use.
+///
+/// Errors: PDMP_NULL.
+pdmp_status pdmp_passage_describe(const pdmp_passage *passage,
+                                  pdmp_passage_info *info);
+
+/// Frees a passage; NULL is ignored. Controllers that use its forcing remain valid.
+void pdmp_passage_free(pdmp_passage *passage);
+
+/// Adds the additional forcing of a passage to that in force, for a movement under way under the conditions of the passage, see
+/// pdmp_passage_options.from_phase.
+///
+/// Position and velocity stay continuous, and the acceleration too if the forcing begins at the present phase or later; one that
+/// began earlier is joined as a goal that has moved. Before the first tick it acts from the start. pdmp_controller_reset ends it.
+///
+/// This function allocates only if a forcing is in force already. Errors: PDMP_NULL; PDMP_RANGE for a passage of another model, or
+/// the ninth forcing with another beginning. The movement then continues.
+pdmp_status pdmp_controller_add_forcing(pdmp_controller *controller,
+                                        const pdmp_passage *passage);
+
+/// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string; `timing` may be NULL.
+///
+/// `*recogniser` is set to the new recogniser, which the caller frees with pdmp_recogniser_free, or to NULL on error. The
+/// degrees of freedom are those of the model, which pdmp_model_load reads from the same file.
+///
+/// Errors: PDMP_NULL; PDMP_IO; PDMP_FILE, also for a model file without a prior; PDMP_RANGE for times that are not finite or in
+/// the wrong order, or a model with rotations or a time warp.
+pdmp_status pdmp_recogniser_load(const char *path,
+                                 const pdmp_timing *timing,
+                                 pdmp_recogniser **recogniser,
+                                 pdmp_text error);
+
+/// Creates a recogniser from the `size` bytes of a model file with a prior, as pdmp_recogniser_load does. The bytes may be freed
+/// afterwards.
+///
+/// Errors: PDMP_NULL, PDMP_FILE, PDMP_RANGE.
+pdmp_status pdmp_recogniser_from_bytes(const void *bytes,
+                                       size_t size,
+                                       const pdmp_timing *timing,
+                                       pdmp_recogniser **recogniser,
+                                       pdmp_text error);
+
+/// Frees a recogniser; NULL is ignored.
+void pdmp_recogniser_free(pdmp_recogniser *recogniser);
+
+/// Includes an observation: the positions (n_dofs) at a time in seconds, after that of the observation before. A degree of freedom
+/// that is not observed is NaN. Intervals are arbitrary.
+///
+/// Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE if the time is not after the one before, or a position is infinite. The recogniser
+/// then remains as it was.
+pdmp_status pdmp_recogniser_update(pdmp_recogniser *recogniser,
+                                   double time,
+                                   pdmp_vector position);
+
+/// Writes the estimate from all observations so far. Its members point into the recogniser, and are valid until the next call on it.
+///
+/// Errors: PDMP_NULL; PDMP_RANGE if there is no observation, or if the observations are too far from the demonstrations.
+pdmp_status pdmp_recogniser_estimate(pdmp_recogniser *recogniser,
+                                     pdmp_estimate *estimate);
+
+/// Predicts the positions at times in seconds, from the last observation on.
+///
+/// `position` and `deviation` take time.length rows of n_dofs numbers, one after the other: means and standard deviations.
+///
+/// Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE if a time is before the last observation, and as for pdmp_recogniser_estimate.
+pdmp_status pdmp_recogniser_continuation(pdmp_recogniser *recogniser,
+                                         pdmp_vector time,
+                                         pdmp_buffer position,
+                                         pdmp_buffer deviation);
+
+/// Forgets all observations. Errors: PDMP_NULL.
+pdmp_status pdmp_recogniser_reset(pdmp_recogniser *recogniser);
+
+/// Writes the error message of the last call on this recogniser that failed, as pdmp_controller_error does.
+size_t pdmp_recogniser_error(const pdmp_recogniser *recogniser, pdmp_text text);
 
 /// Converts the poses of two arms to an absolute and a relative pose. With positions p and unit quaternions q of both arms,
 ///

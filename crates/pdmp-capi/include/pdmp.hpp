@@ -2,7 +2,7 @@
 //
 // Loading, prediction, construction and reset throw pdmp::Error. The functions of the control loop are noexcept and
 // return a pdmp_status: negative values are errors, after which the controller is unchanged and Controller::error
-// returns the message. Lengths, units, equations and thread safety are those of pdmp.h.
+// returns the message. So do those of a recogniser. Lengths, units, equations and thread safety are those of pdmp.h.
 
 #ifndef PDMP_HPP
 #define PDMP_HPP
@@ -45,6 +45,38 @@ pdmp_vector view(const Numbers &&) = delete;
 struct Conditions {
     std::vector<double> style, goal, anchor, start, velocity, goal_velocity;
     std::optional<double> amplitude, tau, phase;
+    /// Additional forcing of a movement through points, see Model::through; none if NULL.
+    std::shared_ptr<const pdmp_passage> forcing{};
+};
+
+/// Point that a movement passes, see pdmp_point: at a time or a phase, with a position, a velocity or both. No `dofs` are all.
+struct Point {
+    std::optional<double> time, phase;
+    std::vector<double> position{}, velocity{};
+    std::vector<std::size_t> dofs{};
+    double tolerance = 0.0;
+};
+
+/// Options of Model::through, see pdmp_passage_options. An empty member is not given.
+struct PassageOptions {
+    std::vector<double> context{};
+    std::optional<double> from_phase{}, deviation{};
+};
+
+/// Movement through points, see pdmp_passage_info. The conditions and the controllers share the forcing.
+struct Passage {
+    Conditions conditions;
+    std::shared_ptr<const pdmp_passage> forcing;
+    double distance;
+    std::size_t n_constraints;
+    bool far;
+    std::vector<double> displacement;
+};
+
+/// Knowledge of the time of a movement that is observed, see pdmp_timing.
+struct Timing {
+    double earliest = 0.0, latest = 0.0;
+    std::optional<double> duration{};
 };
 
 /// Limits of position, velocity, acceleration and jerk, see pdmp_limits: one number for all degrees of freedom, or n_dofs. An
@@ -91,7 +123,13 @@ inline const double *to_c(const std::optional<double> &number) noexcept { return
 inline pdmp_conditions to_c(const Conditions &c) noexcept {
     return {to_c(c.style),    to_c(c.goal),          to_c(c.anchor),    to_c(c.start),
             to_c(c.velocity), to_c(c.goal_velocity), to_c(c.amplitude), to_c(c.tau),
-            to_c(c.phase)};
+            to_c(c.phase),    c.forcing.get()};
+}
+
+inline pdmp_point to_c(const Point &point) noexcept {
+    const std::size_t n = point.dofs.size();
+    return {to_c(point.time), to_c(point.phase), to_c(point.position), to_c(point.velocity), n ? point.dofs.data() : nullptr, n,
+            point.tolerance};
 }
 
 inline pdmp_limits to_c(const Limits &limits) noexcept {
@@ -100,6 +138,16 @@ inline pdmp_limits to_c(const Limits &limits) noexcept {
 }
 
 inline std::vector<double> copy(pdmp_vector numbers) { return {numbers.data, numbers.data + numbers.length}; }
+
+inline std::optional<double> copy(const double *number) {
+    return number ? std::optional<double>(*number) : std::nullopt;
+}
+
+/// Copies conditions without their forcing.
+inline Conditions copy(const pdmp_conditions &c) {
+    return {copy(c.style),    copy(c.goal),          copy(c.anchor),    copy(c.start), copy(c.velocity),
+            copy(c.goal_velocity), copy(c.amplitude), copy(c.tau), copy(c.phase)};
+}
 
 inline pdmp_buffer buffer(std::vector<double> &numbers) noexcept { return {numbers.data(), numbers.size()}; }
 
@@ -174,6 +222,26 @@ public:
         return trajectory;
     }
 
+    /// Computes the most probable movement through points, see pdmp_model_through.
+    Passage through(const std::vector<Point> &points, const Conditions &conditions = {},
+                    const PassageOptions &options = {}) const {
+        std::vector<pdmp_point> c_points;
+        for (const Point &point : points) c_points.push_back(detail::to_c(point));
+        const pdmp_conditions c = detail::to_c(conditions);
+        const pdmp_passage_options c_options{detail::to_c(options.context), detail::to_c(options.from_phase),
+                                             detail::to_c(options.deviation)};
+        pdmp_passage *made = nullptr;
+        detail::check([&](pdmp_text error) {
+            return pdmp_model_through(get(), c_points.data(), c_points.size(), &c, &c_options, &made, error);
+        });
+        const std::shared_ptr<const pdmp_passage> forcing(made, [made](const pdmp_passage *) { pdmp_passage_free(made); });
+        pdmp_passage_info info{};
+        pdmp_passage_describe(made, &info);
+        Conditions own = detail::copy(info.conditions);
+        own.forcing = forcing;
+        return {own, forcing, info.distance, info.n_constraints, info.far != 0, detail::copy(info.displacement)};
+    }
+
     /// Returns the handle, which the model owns; NULL after a move.
     const pdmp_model *get() const noexcept { return model_.get(); }
 
@@ -190,10 +258,7 @@ private:
         std::vector<double> numbers(info().n_conditions);
         pdmp_conditions c{};
         detail::check([&](pdmp_text error) { return call(&c, detail::buffer(numbers), error); });
-        using detail::copy;
-        return {copy(c.style),    copy(c.goal),          copy(c.anchor), copy(c.start),
-                copy(c.velocity), copy(c.goal_velocity), std::nullopt,   *c.tau,
-                std::nullopt};
+        return detail::copy(c);
     }
 
     struct Free {
@@ -267,6 +332,11 @@ public:
         return pdmp_controller_limited(get(), limited.data(), limited.size());
     }
 
+    /// Adds the additional forcing of a passage to that in force, see pdmp_controller_add_forcing.
+    pdmp_status add_forcing(const Passage &passage) noexcept {
+        return pdmp_controller_add_forcing(get(), passage.forcing.get());
+    }
+
     /// Advances the movement by one tick without a new command.
     pdmp_status step() noexcept { return pdmp_controller_step(get()); }
 
@@ -316,6 +386,80 @@ private:
 
     std::size_t n_coordinates_, n_dofs_;
     std::unique_ptr<pdmp_controller, Free> controller_;
+};
+
+/// Positions to come: n_dofs means and standard deviations for each time, one row after the other.
+struct Continuation {
+    /// Allocates the vectors.
+    Continuation(std::size_t n_times, std::size_t n_dofs) : position(n_times * n_dofs), deviation(n_times * n_dofs) {}
+
+    std::vector<double> position, deviation;
+};
+
+/// Filter that estimates a movement while it is observed. One thread at a time may use it.
+class Recogniser {
+public:
+    /// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string.
+    static Recogniser load(const std::string &path, const Timing &timing = {}) {
+        return Recogniser(timing, [&](const pdmp_timing *t, pdmp_recogniser **made, pdmp_text error) {
+            return pdmp_recogniser_load(path.c_str(), t, made, error);
+        });
+    }
+
+    /// Creates a recogniser from the `size` bytes of a model file with a prior.
+    static Recogniser from_bytes(const void *bytes, std::size_t size, const Timing &timing = {}) {
+        return Recogniser(timing, [&](const pdmp_timing *t, pdmp_recogniser **made, pdmp_text error) {
+            return pdmp_recogniser_from_bytes(bytes, size, t, made, error);
+        });
+    }
+
+    /// Includes an observation, see pdmp_recogniser_update; a degree of freedom that is not observed is NaN.
+    pdmp_status update(double time, pdmp_vector position) noexcept {
+        return pdmp_recogniser_update(get(), time, position);
+    }
+
+    /// Writes the estimate, whose members are valid until the next call, see pdmp_recogniser_estimate.
+    pdmp_status estimate(pdmp_estimate &estimate) noexcept { return pdmp_recogniser_estimate(get(), &estimate); }
+
+    /// Returns a copy of the estimated conditions of the whole movement.
+    Conditions conditions() {
+        pdmp_estimate own{};
+        if (const pdmp_status status = estimate(own); status < 0) throw Error(status, error());
+        return detail::copy(own.conditions);
+    }
+
+    /// Writes the positions at times from the last observation on, see pdmp_recogniser_continuation.
+    pdmp_status continuation(pdmp_vector time, Continuation &ahead) noexcept {
+        return pdmp_recogniser_continuation(get(), time, detail::buffer(ahead.position), detail::buffer(ahead.deviation));
+    }
+
+    /// Forgets all observations.
+    pdmp_status reset() noexcept { return pdmp_recogniser_reset(get()); }
+
+    /// Returns the message of the last call that failed; empty before the first error.
+    std::string error() const {
+        char text[512];
+        pdmp_recogniser_error(get(), {text, sizeof text});
+        return text;
+    }
+
+    /// Returns the handle, which the recogniser owns; NULL after a move.
+    pdmp_recogniser *get() const noexcept { return recogniser_.get(); }
+
+private:
+    template <class Load>
+    Recogniser(const Timing &timing, Load load) {
+        const pdmp_timing c{timing.earliest, timing.latest, detail::to_c(timing.duration)};
+        pdmp_recogniser *made = nullptr;
+        detail::check([&](pdmp_text error) { return load(&c, &made, error); });
+        recogniser_.reset(made);
+    }
+
+    struct Free {
+        void operator()(pdmp_recogniser *recogniser) const noexcept { pdmp_recogniser_free(recogniser); }
+    };
+
+    std::unique_ptr<pdmp_recogniser, Free> recogniser_;
 };
 
 /// Position and unit quaternion x, y, z, qw, qx, qy, qz.

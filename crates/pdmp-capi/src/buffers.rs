@@ -1,7 +1,9 @@
 //! Pointers paired with the length of the memory that they point to.
 
-use std::ffi::{c_char, c_void};
+use std::ffi::{CStr, c_char, c_void};
 use std::fmt::{self, Display, Write};
+use std::io::ErrorKind;
+use std::path::Path;
 use std::ptr;
 
 use pdmp_core::Error;
@@ -51,7 +53,7 @@ pub struct pdmp_memory {
 }
 
 /// Returns the length of an array, or `None` for `{NULL, 0}`.
-fn length_of<T>(data: *const T, length: usize, name: &'static str) -> Result<Option<usize>, Fault> {
+pub(crate) fn length_of<T>(data: *const T, length: usize, name: &'static str) -> Result<Option<usize>, Fault> {
     match (data.is_null(), length) {
         (true, 0) => Ok(None),
         (true, _) => Err(Fault::Null(name)),
@@ -59,8 +61,40 @@ fn length_of<T>(data: *const T, length: usize, name: &'static str) -> Result<Opt
     }
 }
 
+/// Returns the path of a file.
+///
+/// # Safety
+/// `path` is NULL or a zero-terminated string that stays valid and unchanged for `'a`.
+pub(crate) unsafe fn path_of<'a>(path: *const c_char) -> Result<&'a Path, Fault> {
+    if path.is_null() {
+        return Err(Fault::Null("path"));
+    }
+    // SAFETY: `path` is not NULL, so the caller guarantees a zero-terminated string.
+    let path = unsafe { CStr::from_ptr(path) };
+    let invalid =
+        |_| Error::Io { path: path.to_string_lossy().into_owned().into(), source: ErrorKind::InvalidFilename.into() };
+    Ok(Path::new(path.to_str().map_err(invalid)?))
+}
+
+/// Returns the contents of a file.
+///
+/// # Safety
+/// `bytes` is NULL or points to `size` bytes that stay valid and unchanged for `'a`.
+pub(crate) unsafe fn bytes_of<'a>(bytes: *const c_void, size: usize) -> Result<&'a [u8], Fault> {
+    if bytes.is_null() {
+        return Err(Fault::Null("bytes"));
+    }
+    // SAFETY: `bytes` is not NULL, so the caller guarantees `size` readable bytes.
+    Ok(unsafe { std::slice::from_raw_parts(bytes.cast(), size) })
+}
+
 impl pdmp_vector {
     pub(crate) const NONE: Self = Self { data: ptr::null(), length: 0 };
+
+    /// Returns a pointer to numbers, which must outlive its use.
+    pub(crate) fn of(numbers: &[f64]) -> Self {
+        Self { data: numbers.as_ptr(), length: numbers.len() }
+    }
 
     /// Returns the numbers, one per `per`, or `None` if they are not given.
     ///
@@ -103,6 +137,24 @@ impl pdmp_buffer {
             Some(found) if found < expected => Err(Error::Length { name, expected, found, per }.into()),
             _ => Ok(()),
         }
+    }
+
+    /// Returns the first `expected` numbers of the buffer, one per `per`, which is required.
+    ///
+    /// # Safety
+    /// `data` is NULL or points to `length` writable numbers, which nothing else uses for `'a`.
+    pub(crate) unsafe fn require<'a>(
+        self,
+        name: &'static str,
+        expected: usize,
+        per: &'static str,
+    ) -> Result<&'a mut [f64], Fault> {
+        self.check(name, expected, per)?;
+        if self.data.is_null() {
+            return Err(Fault::Null(name));
+        }
+        // SAFETY: `data` is not NULL and has at least `expected` numbers, which the caller guarantees.
+        Ok(unsafe { std::slice::from_raw_parts_mut(self.data, expected) })
     }
 
     /// Writes the numbers if the buffer is given.

@@ -7,6 +7,7 @@ use pdmp_core::{Command, Conditions, Controller, Primitive};
 
 use crate::buffers::{pdmp_buffer, pdmp_vector};
 use crate::fault::Fault;
+use crate::passage::pdmp_passage;
 
 /// Conditions of a movement. A member that is `{NULL, 0}` or NULL takes the value of the nominal demonstration.
 #[repr(C)]
@@ -31,6 +32,8 @@ pub struct pdmp_conditions {
     pub tau: *const f64,
     /// Phase phi, in rad, at which the movement starts on its limit cycle; 0 by default; rhythmic models only.
     pub phase: *const f64,
+    /// Additional forcing of a movement through points, see pdmp_model_through; none by default.
+    pub forcing: *const pdmp_passage,
 }
 
 /// Coupling terms, constant over a tick; both or neither.
@@ -117,8 +120,27 @@ impl pdmp_conditions {
             segment_durations: None,
             // SAFETY: the caller guarantees that the pointer is NULL or valid.
             phase: unsafe { self.phase.as_ref() }.copied(),
-            forcing: None,
+            // SAFETY: the caller guarantees that the pointer is NULL or valid.
+            forcing: unsafe { self.forcing.as_ref() }.and_then(|passage| passage.inner.conditions.forcing.clone()),
         })
+    }
+
+    /// Returns pointers to the numbers of the conditions; durations of segments have none.
+    pub(crate) fn view(conditions: &Conditions) -> Self {
+        let vector = |vector: &Option<Vec<f64>>| vector.as_deref().map_or(pdmp_vector::NONE, pdmp_vector::of);
+        let number = |number: &Option<f64>| number.as_ref().map_or(ptr::null(), ptr::from_ref);
+        Self {
+            style: vector(&conditions.style),
+            goal: vector(&conditions.goal),
+            anchor: vector(&conditions.anchor),
+            start: vector(&conditions.start),
+            velocity: vector(&conditions.velocity),
+            goal_velocity: vector(&conditions.goal_velocity),
+            amplitude: number(&conditions.amplitude),
+            tau: number(&conditions.tau),
+            phase: number(&conditions.phase),
+            forcing: ptr::null(),
+        }
     }
 
     /// Copies the numbers of the conditions to `storage`, one vector after the other, and returns pointers to them.
@@ -146,6 +168,7 @@ impl pdmp_conditions {
             amplitude: ptr::null(),
             tau: conditions.tau.map_or(ptr::null(), |tau| append(&[tau]).data),
             phase: ptr::null(),
+            forcing: ptr::null(),
         }
     }
 }

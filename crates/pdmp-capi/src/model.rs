@@ -1,18 +1,16 @@
 //! Models: loading, properties, and conditions of demonstrated and predicted movements.
 
-use std::ffi::{CStr, CString, c_char, c_int, c_void};
-use std::io::ErrorKind;
+use std::ffi::{CString, c_char, c_int, c_void};
 use std::mem::MaybeUninit;
-use std::path::Path;
 use std::ptr;
 use std::sync::Arc;
 
 use pdmp_core::context::{ContextColumn, ContextMap};
 use pdmp_core::demonstration::QuaternionOrder;
 use pdmp_core::model::Coordinates;
-use pdmp_core::{Conditions, Error, Kind, Model};
+use pdmp_core::{Conditions, Kind, Model};
 
-use crate::buffers::{pdmp_buffer, pdmp_text, pdmp_vector};
+use crate::buffers::{bytes_of, path_of, pdmp_buffer, pdmp_text, pdmp_vector};
 use crate::command::pdmp_conditions;
 use crate::fault::Fault;
 use crate::guard::{guard, guard_with_text};
@@ -107,18 +105,8 @@ pub unsafe extern "C" fn pdmp_model_load(
     model: Option<&mut MaybeUninit<*mut pdmp_model>>,
     error: pdmp_text,
 ) -> pdmp_status {
-    let load = || {
-        if path.is_null() {
-            return Err(Fault::Null("path"));
-        }
-        // SAFETY: `path` is not NULL, so the contract of the C ABI guarantees a zero-terminated string.
-        let path = unsafe { CStr::from_ptr(path) };
-        let path = path.to_str().map_err(|_| Error::Io {
-            path: path.to_string_lossy().into_owned().into(),
-            source: ErrorKind::InvalidFilename.into(),
-        });
-        Ok(Model::load(Path::new(path?))?)
-    };
+    // SAFETY: the contract of the C ABI covers `path`.
+    let load = || Ok(Model::load(unsafe { path_of(path) }?)?);
     // SAFETY: the contract of the C ABI covers `error`.
     unsafe { create(model, error, load) }
 }
@@ -135,14 +123,8 @@ pub unsafe extern "C" fn pdmp_model_from_bytes(
     model: Option<&mut MaybeUninit<*mut pdmp_model>>,
     error: pdmp_text,
 ) -> pdmp_status {
-    let load = || {
-        if bytes.is_null() {
-            return Err(Fault::Null("bytes"));
-        }
-        // SAFETY: `bytes` is not NULL, so the contract of the C ABI guarantees `size` readable bytes.
-        let bytes = unsafe { std::slice::from_raw_parts(bytes.cast(), size) };
-        Ok(Model::from_bytes(bytes)?)
-    };
+    // SAFETY: the contract of the C ABI covers `bytes`.
+    let load = || Ok(Model::from_bytes(unsafe { bytes_of(bytes, size) }?)?);
     // SAFETY: the contract of the C ABI covers `error`.
     unsafe { create(model, error, load) }
 }
@@ -271,7 +253,7 @@ pub unsafe extern "C" fn pdmp_model_predict(
     unsafe { write_conditions(model, conditions, storage, error, predict) }
 }
 
-fn n_contexts(model: &Model) -> usize {
+pub(crate) fn n_contexts(model: &Model) -> usize {
     model.demonstrated().contexts.as_ref().map_or(0, |contexts| contexts.ncols())
 }
 

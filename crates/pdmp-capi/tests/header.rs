@@ -19,6 +19,8 @@ fn header_is_fresh() {
         "limits",
         "controller_copies",
         "trajectory",
+        "passage",
+        "recogniser",
         "two_arms",
     ];
     let builder = sources.iter().fold(Builder::new().with_config(config), |builder, name| {

@@ -12,9 +12,12 @@ use std::process::{Command as Process, Output};
 
 use common::*;
 use ndarray::Array2;
+use pdmp_core::inference::{At, PassageOptions, Recogniser, Timing, ViaPoint, through};
+use pdmp_core::learning::learn_prior;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::motion::{Limits, TimeGrid};
+use pdmp_core::numerics::Threads;
 use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status, rollout};
 use tempfile::TempDir;
 
@@ -203,6 +206,51 @@ fn bend(h: f64) -> Demonstration {
 }
 
 #[test]
+fn the_c_example_of_recognition_matches_rust_to_the_bit() {
+    let demos = reaches();
+    let model = learn(&demos, &options(Kind::Discrete));
+    let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    prior.save(&model, &folder.path().join("reach.safetensors")).unwrap();
+
+    let last = model.conditions(&[model.n_demos() - 1]).unwrap();
+    let tau = Some(last.time_constant(model.primitive()).unwrap());
+    let last = Conditions { tau, segment_durations: None, ..last };
+    let movement = rollout(model.primitive(), &last, TimeGrid { dt: 0.01, duration: Some(0.49) }).unwrap();
+    let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
+    let of = |numbers: &[f64]| numbers.iter().map(|number| number.to_bits()).collect::<Vec<u64>>();
+    let mut expected = Vec::new();
+    for (k, position) in movement.position.rows().into_iter().enumerate() {
+        recogniser.update(0.01 * k as f64, &position.to_vec()).unwrap();
+        let estimate = recogniser.estimate().unwrap();
+        expected.push(of(&[&[estimate.arrival], estimate.goal()].concat()));
+    }
+    let times: Vec<f64> = (0..10).map(|k| 0.01 * 49.0 + 0.02 * f64::from(k + 1)).collect();
+    let ahead = recogniser.continuation(&times).unwrap();
+    let rows = ahead.position.rows().into_iter().zip(ahead.deviation.rows());
+    expected.extend(rows.map(|(mean, deviation)| of(&[mean.to_vec(), deviation.to_vec()].concat())));
+
+    let estimate = recogniser.estimate().unwrap();
+    let tau = estimate.duration / (model.duration() / model.tau());
+    let estimated = Conditions { tau: Some(tau), segment_durations: None, ..estimate.conditions() };
+    let height = ahead.position[[9, 1]] + 0.05;
+    let point = ViaPoint { dofs: Some(vec![1]), ..ViaPoint::new(At::Time(times[9]), vec![height]) };
+    let passage = through(&model, &[point], &estimated, &PassageOptions::default()).unwrap();
+    let mut controller = Controller::new(model.primitive(), 1e-3, &passage.conditions, None).unwrap();
+    for tick in 1..=700 {
+        controller.step().unwrap();
+        expected.push(of(controller.position()));
+        if tick == 690 {
+            assert!((controller.position()[1] - height).abs() < 1e-9);
+        }
+    }
+    let source = root().join("examples/c/recognition.c");
+    for printed in outputs(C, &source, folder.path(), &["reach.safetensors"]) {
+        assert_eq!(bits(&printed, 0), expected);
+    }
+}
+
+#[test]
 fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
     let units = ["rad", "rad", "m"].map(String::from).to_vec();
     let demos: Vec<_> = reaches().into_iter().map(|demo| demo.with_units(units.clone()).unwrap()).collect();
@@ -250,7 +298,9 @@ fn every_member_of_the_cpp_wrapper_matches_rust_to_the_bit() {
         rows.iter().flatten().map(|number| number.to_bits()).collect()
     }));
 
-    let folder = saved(&model, "reach.safetensors");
+    let folder = tempfile::tempdir().unwrap();
+    let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
+    prior.save(&model, &folder.path().join("reach.safetensors")).unwrap();
     let source = root().join("crates/pdmp-capi/tests/wrapper.cpp");
     for printed in outputs(CPP, &source, folder.path(), &["reach.safetensors"]) {
         assert_eq!(bits(&printed, 0), expected);

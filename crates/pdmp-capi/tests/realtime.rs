@@ -12,9 +12,12 @@ use std::ptr;
 use common::*;
 use counting::{Random, allocations};
 use pdmp::*;
+use pdmp_core::inference::{Recogniser, Timing};
+use pdmp_core::learning::learn_prior;
 use pdmp_core::motion::Compliance;
 use pdmp_core::motion::Coupling;
 use pdmp_core::motion::Limits;
+use pdmp_core::numerics::Threads;
 use pdmp_core::{Command, Conditions, Controller, Kind, Motion};
 
 fn vector(numbers: Option<&[f64]>) -> pdmp_vector {
@@ -208,4 +211,88 @@ fn matches_rust(kind: Kind, limits: &Limits, n_ticks: usize) {
         pdmp_controller_free(c);
         pdmp_controller_free(copy);
     };
+}
+
+/// Observations of random parts at random times give the estimates of Rust to the bit, and allocate nothing.
+#[test]
+fn recognition_matches_rust_to_the_bit_and_allocates_nothing() {
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
+        let model = learn(&demos, &options(kind));
+        let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
+        let timing = Timing { starts: [-0.1, 0.2], duration: None };
+        let mut rust = Recogniser::new(&model, &prior, timing).unwrap();
+        let bytes = prior.to_bytes(&model).unwrap();
+        let none = pdmp_text { data: ptr::null_mut(), size: 0 };
+        let c_timing = pdmp_timing { earliest: -0.1, latest: 0.2, duration: ptr::null() };
+        let mut made = MaybeUninit::uninit();
+        // SAFETY: every pointer is valid, and the library allocates a recogniser as a `Box`.
+        let mut c = unsafe {
+            let (data, size) = (bytes.as_ptr().cast(), bytes.len());
+            let status = pdmp_recogniser_from_bytes(data, size, Some(&c_timing), Some(&mut made), none);
+            assert_eq!(status, pdmp_status::PDMP_OK);
+            Box::from_raw(made.assume_init())
+        };
+        let n_dofs = model.n_dofs();
+        let (mut position, mut random, mut time) = (vec![0.0; n_dofs], Random(4), 3.0);
+        let zeros = || vec![0.0; 2 * n_dofs];
+        let (mut mean, mut deviation, mut written) = (zeros(), zeros(), [zeros(), zeros()]);
+        let buffers = written.each_mut().map(|numbers| pdmp_buffer { data: numbers.as_mut_ptr(), length: 2 * n_dofs });
+        let (mut estimates, before) = (0, allocations());
+        for k in 0..60 {
+            time += random.scale(1e-3, 0.05);
+            if k == 40 {
+                rust.reset();
+                assert_eq!(pdmp_recogniser_reset(Some(&mut c)), pdmp_status::PDMP_OK);
+            }
+            position.iter_mut().for_each(|y| *y = if random.rarely() { f64::NAN } else { random.next() });
+            let mut estimate = MaybeUninit::uninit();
+            let ahead = [time, time + 0.1];
+            // SAFETY: the vectors and buffers are valid.
+            unsafe {
+                let status = pdmp_recogniser_update(Some(&mut c), time, vector(Some(&position)));
+                assert_eq!(rust.update(time, &position).is_ok(), status == pdmp_status::PDMP_OK);
+                let status = pdmp_recogniser_continuation(Some(&mut c), vector(Some(&ahead)), buffers[0], buffers[1]);
+                let done = rust.write_continuation(&ahead, &mut mean, &mut deviation);
+                assert_eq!(done.is_ok(), status == pdmp_status::PDMP_OK);
+                assert!(bits(&mean).eq(bits(&written[0])) && bits(&deviation).eq(bits(&written[1])));
+            }
+            let status = pdmp_recogniser_estimate(Some(&mut c), Some(&mut estimate));
+            let Ok(expected) = rust.estimate() else {
+                assert_eq!(status, pdmp_status::PDMP_RANGE);
+                continue;
+            };
+            assert_eq!(status, pdmp_status::PDMP_OK);
+            // SAFETY: the call has succeeded, so it is written.
+            let found = unsafe { estimate.assume_init() };
+            let conditions = found.conditions;
+            // SAFETY: the members point into the recogniser, which is not used until the end of this block.
+            let same = |vector: pdmp_vector, numbers: &[f64]| unsafe {
+                bits(std::slice::from_raw_parts(vector.data, vector.length)).eq(bits(numbers))
+            };
+            let n_styles = expected.n_styles;
+            let discrete = kind == Kind::Discrete;
+            assert!(same(conditions.style, expected.style()));
+            assert!(same(if discrete { conditions.goal } else { conditions.anchor }, expected.goal()));
+            assert!(!discrete || same(conditions.start, &expected.parameters[n_styles + n_dofs..]));
+            assert!(same(found.style_deviation, &expected.deviations[..n_styles]));
+            assert!(same(found.goal_deviation, expected.goal_deviation()));
+            assert_eq!(conditions.phase.is_null(), discrete);
+            // SAFETY: as above.
+            let tau = unsafe { *conditions.tau };
+            assert!((tau / (model.tau() * expected.duration / model.duration()) - 1.0).abs() < 1e-12);
+            let numbers = [found.duration, found.duration_deviation, found.arrival, found.fraction, found.surprise];
+            let rust = [
+                expected.duration,
+                expected.duration_deviation,
+                expected.arrival,
+                expected.fraction,
+                expected.surprise,
+            ];
+            assert!(bits(&numbers).eq(bits(&rust)));
+            estimates += 1;
+        }
+        assert_eq!(allocations() - before, 0);
+        assert!(estimates > 50, "{estimates}");
+    }
 }

@@ -16,9 +16,10 @@ use common::*;
 use pdmp::pdmp_status::*;
 use pdmp::*;
 use pdmp_core::context::{ContextMapKind, MapSelection};
-use pdmp_core::learning::TimeScaling;
+use pdmp_core::learning::{TimeScaling, learn_prior};
 use pdmp_core::model::TimeWarp;
 use pdmp_core::motion::{TimeGrid, TwoArms};
+use pdmp_core::numerics::Threads;
 use pdmp_core::{Error, Kind, rollout};
 
 const NO_VECTOR: pdmp_vector = pdmp_vector { data: ptr::null(), length: 0 };
@@ -46,6 +47,7 @@ const NO_CONDITIONS: pdmp_conditions = pdmp_conditions {
     amplitude: ptr::null(),
     tau: ptr::null(),
     phase: ptr::null(),
+    forcing: ptr::null(),
 };
 const SETTINGS: pdmp_settings =
     pdmp_settings { dt: 1e-3, transition: ptr::null(), memory: pdmp_memory { data: ptr::null_mut(), size: 0 } };
@@ -65,6 +67,19 @@ fn vector(numbers: &[f64]) -> pdmp_vector {
 
 fn buffer(numbers: &mut [f64]) -> pdmp_buffer {
     pdmp_buffer { data: numbers.as_mut_ptr(), length: numbers.len() }
+}
+
+/// Returns a point at a time without position or velocity.
+fn point_at(time: &f64) -> pdmp_point {
+    pdmp_point {
+        time,
+        phase: ptr::null(),
+        position: NO_VECTOR,
+        velocity: NO_VECTOR,
+        dofs: ptr::null(),
+        n_dofs: 0,
+        tolerance: 0.0,
+    }
 }
 
 /// Returns the result of a call, and the string that it writes to a text of `size` bytes.
@@ -171,6 +186,7 @@ impl Drop for Running {
 fn null_for_a_required_argument_is_an_error() {
     let model = loaded(Kind::Discrete);
     let (mut made, mut out) = (MaybeUninit::uninit(), MaybeUninit::uninit());
+    let (mut passed, mut watching) = (MaybeUninit::uninit(), MaybeUninit::uninit());
     let mut conditions = MaybeUninit::uninit();
     let mut numbers = vec![0.0; info(&model).n_conditions];
     let storage = buffer(&mut numbers);
@@ -228,14 +244,31 @@ fn null_for_a_required_argument_is_an_error() {
             pdmp_model_rollout(Some(&model), None, 0.01, 2, None, NO_TEXT),
             pdmp_controller_forecast(None, 0.01, 2, None),
             pdmp_controller_forecast(running.handle(), 0.01, 2, None),
+            pdmp_model_through(None, ptr::null(), 0, None, None, Some(&mut passed), NO_TEXT),
+            pdmp_model_through(Some(&model), ptr::null(), 0, None, None, Some(&mut passed), NO_TEXT),
+            pdmp_model_through(Some(&model), ptr::null(), 2, None, None, Some(&mut passed), NO_TEXT),
+            pdmp_model_through(Some(&model), [point_at(&0.4)].as_ptr(), 1, None, None, None, NO_TEXT),
+            pdmp_passage_describe(None, None),
+            pdmp_controller_add_forcing(None, None),
+            pdmp_controller_add_forcing(running.handle(), None),
+            pdmp_recogniser_load(ptr::null(), None, Some(&mut watching), NO_TEXT),
+            pdmp_recogniser_load(c"absent".as_ptr(), None, None, NO_TEXT),
+            pdmp_recogniser_from_bytes(ptr::null(), 8, None, Some(&mut watching), NO_TEXT),
+            pdmp_recogniser_update(None, 0.0, NO_VECTOR),
+            pdmp_recogniser_estimate(None, None),
+            pdmp_recogniser_continuation(None, NO_VECTOR, NO_BUFFER, NO_BUFFER),
+            pdmp_recogniser_reset(None),
+            pdmp_controller_read(running.handle(), None),
         ] {
             assert_eq!(status, PDMP_NULL);
         }
-        assert_eq!(pdmp_controller_error(None, NO_TEXT), 0);
+        assert_eq!(pdmp_controller_error(None, NO_TEXT) + pdmp_recogniser_error(None, NO_TEXT), 0);
         assert!(pdmp_model_name(None, 0).is_null() && pdmp_model_unit(None, 0).is_null());
         pdmp_controller_free(ptr::null_mut());
     }
     pdmp_model_free(None);
+    pdmp_passage_free(None);
+    pdmp_recogniser_free(None);
     assert_eq!(running.error(), "motion is NULL");
 }
 
@@ -794,4 +827,262 @@ fn poses_of_two_arms_are_those_of_rust() {
         refused(l, vector(&[0.0; 7]), about, NO_BUFFER, PDMP_RANGE, "right");
         refused(l, vector(&[-0.5, 0.0, 0.0, 0.0, 0.0, -0.6, 0.8]), vector(&left[3..]), NO_BUFFER, PDMP_RANGE, "right");
     }
+}
+
+fn passage(
+    model: &pdmp_model,
+    points: &[pdmp_point],
+    conditions: Option<&pdmp_conditions>,
+    options: Option<&pdmp_passage_options>,
+) -> Result<Box<pdmp_passage>, (pdmp_status, String)> {
+    let mut made = MaybeUninit::uninit();
+    let (status, text) = with_text(256, |error| {
+        // SAFETY: every pointer is NULL or valid.
+        unsafe {
+            pdmp_model_through(Some(model), points.as_ptr(), points.len(), conditions, options, Some(&mut made), error)
+        }
+    });
+    // SAFETY: the passage is written on success and on error, and the library allocates it as a `Box`.
+    let made = unsafe { made.assume_init() };
+    assert_eq!(made.is_null(), status != PDMP_OK);
+    // SAFETY: as above.
+    if made.is_null() { Err((status, text)) } else { Ok(unsafe { Box::from_raw(made) }) }
+}
+
+fn describe(passage: &pdmp_passage) -> pdmp_passage_info {
+    let mut info = MaybeUninit::uninit();
+    assert_eq!(pdmp_passage_describe(Some(passage), Some(&mut info)), PDMP_OK);
+    // SAFETY: the call has succeeded, so it is written.
+    unsafe { info.assume_init() }
+}
+
+#[test]
+fn movements_pass_points_from_the_start_and_under_way() {
+    let model = loaded(Kind::Discrete);
+    let (time, dof, height) = (0.4, 1, [0.31]);
+    let point = pdmp_point { position: vector(&height), dofs: &dof, n_dofs: 1, ..point_at(&time) };
+    let passed = passage(&model, &[point], None, None).unwrap();
+    let info = describe(&passed);
+    assert!(info.distance >= 0.0 && info.n_constraints == 1 && info.displacement.length == 3 && info.far <= 1);
+    let (status, controller, text) = start(&model, &SETTINGS, Some(&info.conditions));
+    assert_eq!((status, text.as_str()), (PDMP_OK, ""));
+    let mut running = Running(controller);
+    (0..400).for_each(|_| assert_eq!(pdmp_controller_step(running.handle()), PDMP_WORKING));
+    assert!((running.state(3)[1] - height[0]).abs() < 1e-9, "{:?}", running.state(3));
+
+    // Under way, the conditions remain.
+    let mut numbers = vec![0.0; self::info(&model).n_conditions];
+    let mut conditions = MaybeUninit::uninit();
+    // SAFETY: every pointer is valid.
+    let conditions = unsafe {
+        assert_eq!(
+            pdmp_model_demonstration(Some(&model), 2, Some(&mut conditions), buffer(&mut numbers), NO_TEXT),
+            PDMP_OK
+        );
+        conditions.assume_init()
+    };
+    let (status, controller, _) = start(&model, &SETTINGS, Some(&conditions));
+    assert_eq!(status, PDMP_OK);
+    let mut running = Running(controller);
+    (0..200).for_each(|_| assert_eq!(pdmp_controller_step(running.handle()), PDMP_WORKING));
+    let before = running.state(3);
+    let options =
+        pdmp_passage_options { context: NO_VECTOR, from_phase: &before[before.len() - 1], deviation: ptr::null() };
+    let higher = [0.5];
+    let point = pdmp_point { position: vector(&higher), ..point };
+    let change = passage(&model, &[point], Some(&conditions), Some(&options)).unwrap();
+    assert_eq!(pdmp_controller_add_forcing(running.handle(), Some(&change)), PDMP_OK);
+    let after = running.state(3);
+    assert!(before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-9 * a.abs().max(1.0)), "{before:?} {after:?}");
+    drop(change);
+    (0..200).for_each(|_| assert_eq!(pdmp_controller_step(running.handle()), PDMP_WORKING));
+    assert!((running.state(3)[1] - higher[0]).abs() < 1e-6, "{:?}", running.state(3));
+
+    let other = loaded(Kind::Rhythmic);
+    let forcing =
+        passage(&other, &[pdmp_point { position: vector(&[1.0, -2.0]), ..point_at(&time) }], None, None).unwrap();
+    assert_eq!(pdmp_controller_add_forcing(running.handle(), Some(&forcing)), PDMP_RANGE);
+    assert!(running.error().contains("forcing"), "{}", running.error());
+}
+
+#[test]
+fn points_that_no_movement_passes_are_refused() {
+    let model = loaded(Kind::Discrete);
+    let (time, late, position) = (0.4, 9.0, [0.5, 0.3, 0.0]);
+    let valid = pdmp_point { position: vector(&position), ..point_at(&time) };
+    let bad = [f64::NAN, 0.0, 0.0];
+    let (outside, three) = ([7usize], [0usize, 1, 2]);
+    for (point, status, part) in [
+        (point_at(&time), PDMP_RANGE, "points constrain nothing"),
+        (pdmp_point { time: ptr::null(), ..valid }, PDMP_RANGE, "a time or a phase"),
+        (pdmp_point { phase: &time, ..valid }, PDMP_RANGE, "a time or a phase"),
+        (pdmp_point { time: &late, ..valid }, PDMP_RANGE, "time"),
+        (pdmp_point { position: vector(&position[..2]), ..valid }, PDMP_LENGTH, "position"),
+        (pdmp_point { velocity: vector(&position[..1]), ..valid }, PDMP_LENGTH, "velocity"),
+        (pdmp_point { position: vector(&bad), ..valid }, PDMP_RANGE, "position"),
+        (pdmp_point { tolerance: -1.0, ..valid }, PDMP_RANGE, "tolerance"),
+        (pdmp_point { dofs: ptr::null(), n_dofs: 1, ..valid }, PDMP_NULL, "dofs"),
+        (pdmp_point { dofs: three.as_ptr(), n_dofs: 2, ..valid }, PDMP_LENGTH, "position"),
+        (
+            pdmp_point { position: vector(&position[..1]), dofs: outside.as_ptr(), n_dofs: 1, ..valid },
+            PDMP_RANGE,
+            "dofs",
+        ),
+    ] {
+        let (found, text) = passage(&model, &[point], None, None).err().unwrap();
+        assert!(found == status && text.contains(part), "{found:?} {text}: expected {status:?} {part}");
+    }
+    let twice = pdmp_point { position: vector(&[0.5, 0.4, 0.0]), ..valid };
+    assert!(passage(&model, &[valid, twice], None, None).is_err(), "contradictory points");
+    let deviation = -1.0;
+    let options = pdmp_passage_options { context: NO_VECTOR, from_phase: ptr::null(), deviation: &deviation };
+    assert!(passage(&model, &[valid], None, Some(&options)).is_err());
+    let context = [0.2];
+    let options = pdmp_passage_options { context: vector(&context), from_phase: ptr::null(), deviation: ptr::null() };
+    assert!(passage(&model, &[valid], None, Some(&options)).is_ok());
+    let short = pdmp_passage_options { context: vector(&[]), ..options };
+    assert!(passage(&model, &[valid], None, Some(&short)).is_err());
+    let anchored = pdmp_conditions { anchor: vector(&position), ..NO_CONDITIONS };
+    assert_eq!(passage(&model, &[valid], Some(&anchored), None).err().unwrap().0, PDMP_ABSENT);
+}
+
+/// Points of extreme numbers are refused with a message, or their movement has finite numbers.
+#[test]
+fn random_points_are_refused_or_passed_in_finite_numbers() {
+    const NUMBERS: [f64; 16] = [
+        0.0,
+        -0.5,
+        0.3,
+        0.5,
+        0.8,
+        1.0,
+        1e-300,
+        1e-9,
+        1e-3,
+        30.0,
+        1e9,
+        -1e100,
+        1e150,
+        f64::MAX,
+        f64::INFINITY,
+        f64::NAN,
+    ];
+    let mut random = random::Random(6);
+    let mut below = |n: usize| (random.next() * n as f64) as usize;
+    let mut accepted = 0;
+    for kind in [Kind::Discrete, Kind::Rhythmic] {
+        let model = loaded(kind);
+        let n = info(&model).n_dofs;
+        for _ in 0..1500 {
+            let mut number = |rarely: usize| {
+                let n_choices = if below(rarely) == 0 { NUMBERS.len() } else { 6 };
+                NUMBERS[below(n_choices)]
+            };
+            let numbers: Vec<f64> = (0..4 * n + 4).map(|k| number(if k < 4 { 4 } else { 20 })).collect();
+            let [time, phase, deviation, tolerance] = [0, 1, 2, 3].map(|k| &numbers[k]);
+            let dofs: Vec<usize> = (0..below(n + 1)).map(|_| below(n + 1)).collect();
+            let count = if dofs.is_empty() { n } else { dofs.len() };
+            let either = |given: bool, number| if given { number } else { ptr::null() };
+            let points: Vec<pdmp_point> = (0..=below(2))
+                .map(|k| pdmp_point {
+                    time: either(below(3) > 0, time),
+                    phase: either(below(3) == 0, phase),
+                    position: if below(5) > 0 { vector(&numbers[4 + k * n..][..count]) } else { NO_VECTOR },
+                    velocity: if below(3) == 0 { vector(&numbers[4 + 2 * n..][..count]) } else { NO_VECTOR },
+                    dofs: if dofs.is_empty() { ptr::null() } else { dofs.as_ptr() },
+                    n_dofs: dofs.len(),
+                    tolerance: if below(3) == 0 { *tolerance } else { 0.0 },
+                })
+                .collect();
+            let conditions = pdmp_conditions {
+                start: if below(4) == 0 { vector(&numbers[4 + 3 * n..]) } else { NO_VECTOR },
+                tau: either(below(4) == 0, phase),
+                ..NO_CONDITIONS
+            };
+            let options = pdmp_passage_options {
+                context: NO_VECTOR,
+                from_phase: either(below(4) == 0, time),
+                deviation: either(below(4) == 0, deviation),
+            };
+            let passed = match passage(&model, &points, Some(&conditions), Some(&options)) {
+                Ok(passed) => passed,
+                Err((status, text)) => {
+                    assert!(matches!(status, PDMP_RANGE | PDMP_ABSENT) && !text.is_empty(), "{status:?} {text}");
+                    continue;
+                }
+            };
+            let found = describe(&passed);
+            // SAFETY: the vector points into the passage.
+            let displacement =
+                unsafe { std::slice::from_raw_parts(found.displacement.data, found.displacement.length) };
+            assert!(found.distance.is_finite() && displacement.iter().all(|x| x.is_finite()), "{found:?} {points:?}");
+            let (status, controller, text) = start(&model, &SETTINGS, Some(&found.conditions));
+            if status != PDMP_OK {
+                assert!(controller.is_null() && !text.is_empty(), "{status:?} {text}");
+                continue;
+            }
+            let mut running = Running(controller);
+            for _ in 0..20 {
+                if (pdmp_controller_step(running.handle()) as i32) < 0 {
+                    break;
+                }
+            }
+            assert!(running.state(n).iter().all(|x| x.is_finite()), "{found:?} {points:?}");
+            accepted += 1;
+        }
+    }
+    assert!(accepted > 200, "{accepted}");
+}
+
+#[test]
+fn bad_observations_are_refused_with_a_message() {
+    let demos = reaches();
+    let model = learn(&demos, &options(Kind::Discrete));
+    let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
+    let new = |bytes: &[u8], timing: Option<&pdmp_timing>| {
+        let mut made = MaybeUninit::uninit();
+        let (status, text) = with_text(256, |error| {
+            // SAFETY: every pointer is valid.
+            unsafe { pdmp_recogniser_from_bytes(bytes.as_ptr().cast(), bytes.len(), timing, Some(&mut made), error) }
+        });
+        // SAFETY: the recogniser is written on success and on error, and the library allocates it as a `Box`.
+        let made = unsafe { made.assume_init() };
+        assert_eq!(made.is_null(), status != PDMP_OK);
+        // SAFETY: as above.
+        (status, text, (!made.is_null()).then(|| unsafe { Box::from_raw(made) }))
+    };
+    let (status, text, _) = new(&model.to_bytes().unwrap(), None);
+    assert!(status == PDMP_FILE && text.contains("no prior"), "{status:?} {text}");
+    let bytes = prior.to_bytes(&model).unwrap();
+    assert_eq!(new(&bytes[..bytes.len() / 2], None).0, PDMP_FILE);
+    let timing = pdmp_timing { earliest: 1.0, latest: 0.0, duration: ptr::null() };
+    let (status, text, _) = new(&bytes, Some(&timing));
+    assert!(status == PDMP_RANGE && text.contains("starts"), "{status:?} {text}");
+
+    let mut recogniser = new(&bytes, None).2.unwrap();
+    let mut estimate = MaybeUninit::uninit();
+    let mut numbers = [7.0; 6];
+    let outputs = numbers.each_mut().map(|x| pdmp_buffer { data: x, length: 3 });
+    // SAFETY: every pointer is valid.
+    unsafe {
+        assert_eq!(pdmp_recogniser_estimate(Some(&mut recogniser), Some(&mut estimate)), PDMP_RANGE);
+        let message =
+            |recogniser: &pdmp_recogniser| with_text(200, |text| pdmp_recogniser_error(Some(recogniser), text)).1;
+        assert!(message(&recogniser).contains("observations"), "{}", message(&recogniser));
+        let place = [0.2, 0.0, 0.0];
+        assert_eq!(pdmp_recogniser_update(Some(&mut recogniser), 0.5, vector(&place)), PDMP_OK);
+        assert_eq!(pdmp_recogniser_update(Some(&mut recogniser), 0.5, vector(&place)), PDMP_RANGE);
+        assert!(message(&recogniser).contains("time"), "{}", message(&recogniser));
+        assert_eq!(pdmp_recogniser_update(Some(&mut recogniser), 0.6, vector(&place[..2])), PDMP_LENGTH);
+        assert_eq!(pdmp_recogniser_update(Some(&mut recogniser), 0.6, NO_VECTOR), PDMP_NULL);
+        assert_eq!(pdmp_recogniser_estimate(Some(&mut recogniser), None), PDMP_NULL);
+        let mut ahead = |time: f64, position, deviation| {
+            pdmp_recogniser_continuation(Some(&mut recogniser), vector(&[time]), position, deviation)
+        };
+        assert_eq!(ahead(0.4, outputs[0], outputs[3]), PDMP_RANGE);
+        assert_eq!(ahead(0.6, pdmp_buffer { length: 2, ..outputs[0] }, outputs[3]), PDMP_LENGTH);
+        assert_eq!(ahead(0.6, outputs[0], NO_BUFFER), PDMP_NULL);
+        assert_eq!(ahead(0.6, outputs[0], outputs[3]), PDMP_OK);
+    }
+    assert!(numbers[..3].iter().all(|x| x.abs() < 2.0) && numbers[3..].iter().all(|sd| *sd > 0.0), "{numbers:?}");
 }

@@ -123,6 +123,50 @@ int main(int, char **argv) try {
     const auto again = arms.left_right(absolute, relative);
     for (int k = 0; k < 7; ++k) REQUIRE(std::abs(again[0][k] - left[k]) + std::abs(again[1][k] - right[k]) < 1e-15);
 
+    pdmp::Point point;
+    point.time = 0.4;
+    point.position = {0.31};
+    point.dofs = {1};
+    const auto passage = model.through({point});
+    REQUIRE(passage.n_constraints == 1 && passage.displacement.size() == 3 && passage.distance >= 0.0);
+    REQUIRE(std::abs(model.rollout(passage.conditions, 0.01, 41).position[3 * 40 + 1] - 0.31) < 1e-9);
+    pdmp::Controller passing(model, 0.002, passage.conditions);
+    for (int tick = 0; tick < 100; ++tick) REQUIRE(passing.step() > 0);
+    pdmp::PassageOptions options;
+    double from = 0.0;
+    REQUIRE(passing.progress(nullptr, &from) > 0);
+    options.from_phase = from;
+    point.time = 0.6;
+    REQUIRE(passing.add_forcing(model.through({point}, passage.conditions, options)) == PDMP_OK);
+    for (int tick = 0; tick < 200; ++tick) REQUIRE(passing.step() > 0);
+    REQUIRE(passing.read(motion) > 0 && std::abs(motion.position[1] - 0.31) < 1e-6);
+    REQUIRE(status_thrown_by([&] { model.through({}); }) == PDMP_NULL);
+    REQUIRE(status_thrown_by([&] { model.through({pdmp::Point{}}); }) == PDMP_RANGE);
+
+    pdmp::Timing timing;
+    timing.latest = 0.1;
+    auto recogniser = pdmp::Recogniser::from_bytes(bytes.data(), bytes.size(), timing);
+    REQUIRE(status_thrown_by([&] { recogniser.conditions(); }) == PDMP_RANGE && !recogniser.error().empty());
+    const auto movement = model.rollout(model.demonstration(2), 0.01, 60);
+    const auto watch = [&](pdmp::Recogniser &own) {
+        for (int k = 0; k < 60; ++k) {
+            const pdmp_vector position{movement.position.data() + 3 * k, 3};
+            REQUIRE(own.update(0.01 * k, position) == PDMP_OK);
+        }
+        return own.conditions();
+    };
+    const auto seen = watch(recogniser);
+    REQUIRE(std::abs(seen.goal[0] - model.demonstration(2).goal[0]) < 0.05 && seen.tau && seen.start.size() == 3);
+    pdmp_estimate estimate{};
+    REQUIRE(recogniser.estimate(estimate) == PDMP_OK && estimate.fraction > 0.3 && estimate.goal_deviation.length == 3);
+    const std::array<double, 2> times{0.7, 0.8};
+    pdmp::Continuation ahead_of(2, 3);
+    REQUIRE(recogniser.continuation(pdmp::view(times), ahead_of) == PDMP_OK && ahead_of.deviation[5] > 0.0);
+    REQUIRE(recogniser.reset() == PDMP_OK && watch(recogniser).goal == seen.goal);
+    auto other = pdmp::Recogniser::load(argv[1]);
+    pdmp::Controller following(model, 0.002, watch(other));
+    REQUIRE(following.step() == PDMP_WORKING);
+
     const auto rollout = model.rollout(model.predict({0.2}), 0.01, 40);
     REQUIRE(rollout.velocity.size() == 120);
     for (int row = 0; row < 40; ++row) {

@@ -7,12 +7,25 @@ mod common;
 use std::sync::{Arc, LazyLock};
 
 use common::*;
+use pdmp_core::inference::{Prior, Recogniser, Timing};
+use pdmp_core::learning::learn_prior;
 use pdmp_core::motion::TimeGrid;
+use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
-use pdmp_core::{Conditions, Error, Kind, Model};
+use pdmp_core::{Conditions, Demonstration, Error, Kind, Model};
 use proptest::prelude::*;
 
 static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| learn(&reaches(), &options(Kind::Discrete)).to_bytes().unwrap());
+static WITH_PRIOR: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let (model, prior) = with_prior(&reaches(), Kind::Discrete);
+    prior.to_bytes(&model).unwrap()
+});
+
+fn with_prior(demos: &[Demonstration], kind: Kind) -> (Arc<Model>, Prior) {
+    let model = learn(demos, &options(kind));
+    let prior = learn_prior(&model, demos, None, Threads::ONE).unwrap();
+    (model, prior)
+}
 
 /// A loaded model is bitwise the saved one, for both kinds, with and without contexts.
 #[test]
@@ -42,7 +55,67 @@ fn a_loaded_model_moves_like_the_saved_one() {
     }
 }
 
+/// A prior is kept in the file of its model, bit for bit, and both are read from it.
+#[test]
+fn a_file_keeps_the_prior_with_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.safetensors");
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles())] {
+        let (model, prior) = with_prior(&demos, kind);
+        prior.save(&model, &path).unwrap();
+        let (same, loaded) = (Model::load(&path).unwrap(), Prior::load(&path).unwrap());
+        assert_eq!(loaded, prior);
+        assert_eq!(loaded.to_bytes(&same).unwrap(), std::fs::read(&path).unwrap());
+        assert_eq!(same.to_bytes().unwrap(), model.to_bytes().unwrap());
+        let estimates = [(&*model, &prior), (&same, &loaded)].map(|(model, prior)| {
+            let mut recogniser = Recogniser::new(model, prior, Timing::default()).unwrap();
+            for (k, position) in demos[2].position().rows().into_iter().enumerate().take(40) {
+                recogniser.update(0.01 * k as f64, &position.to_vec()).unwrap();
+            }
+            recogniser.estimate().unwrap().clone()
+        });
+        assert_eq!(estimates[0], estimates[1]);
+        // The model alone replaces both.
+        model.save(&path).unwrap();
+        let message = Prior::load(&path).unwrap_err().to_string();
+        assert!(message.contains("model.safetensors") && message.contains("no prior"), "{message}");
+    }
+    let (other, (_, prior)) = (learn(&cycles(), &options(Kind::Rhythmic)), with_prior(&reaches(), Kind::Discrete));
+    assert_eq!(prior.to_bytes(&other).unwrap_err().argument(), Some("prior"));
+    assert!(matches!(Prior::load(std::path::Path::new("/nowhere/model.safetensors")), Err(Error::Io { .. })));
+}
+
 proptest! {
+    /// A flipped bit of a file with a prior is detected at any place, by both readers.
+    #[test]
+    fn a_flipped_bit_of_a_file_with_a_prior_is_rejected(place in any::<prop::sample::Index>(), bit in 0..8u8) {
+        let mut bytes = WITH_PRIOR.clone();
+        let place = place.index(bytes.len());
+        bytes[place] ^= 1 << bit;
+        prop_assert!(matches!(Model::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
+        prop_assert!(matches!(Prior::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
+    }
+
+    /// A flipped bit in the header of a file with a prior is detected, too.
+    #[test]
+    fn a_flipped_bit_in_the_header_with_a_prior_is_rejected(place in 0..2500usize, bit in 0..8u8) {
+        let mut bytes = WITH_PRIOR.clone();
+        bytes[place] ^= 1 << bit;
+        prop_assert!(matches!(Model::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
+        prop_assert!(matches!(Prior::from_bytes(&bytes), Err(Error::File(_))), "byte {place}, bit {bit}");
+    }
+
+    /// A file with a prior that is truncated at any place is rejected, and random bytes are.
+    #[test]
+    fn a_truncated_file_with_a_prior_is_rejected(
+        place in any::<prop::sample::Index>(),
+        bytes in prop::collection::vec(any::<u8>(), 0..400),
+    ) {
+        let place = place.index(WITH_PRIOR.len());
+        prop_assert!(matches!(Prior::from_bytes(&WITH_PRIOR[..place]), Err(Error::File(_))));
+        prop_assert!(matches!(Prior::from_bytes(&bytes), Err(Error::File(_))));
+    }
+
     /// A flipped bit is detected at any place.
     #[test]
     fn a_flipped_bit_is_rejected(place in any::<prop::sample::Index>(), bit in 0..8u8) {

@@ -23,12 +23,13 @@ fn learnt(demos: &[Demonstration], kind: Kind) -> (Model, Prior) {
     (model, prior)
 }
 
-/// Observations and estimates do not allocate, with samples missing, gaps, and after a reset.
+/// Observations, estimates and continuations do not allocate, with samples missing, gaps, and after a reset.
 #[test]
 fn observations_allocate_nothing() {
     let (model, prior) = learnt(&recordings(), Kind::Discrete);
     let mut recogniser = Recogniser::new(&model, &prior, Timing { starts: [-0.2, 0.3], duration: None }).unwrap();
     let mut random = Random(2);
+    let (mut ahead, mut deviation) = ([0.0; 6], [0.0; 6]);
     let before = allocations();
     let mut time = 0.0;
     for _ in 0..40 {
@@ -38,9 +39,13 @@ fn observations_allocate_nothing() {
         recogniser.update(time, &position).unwrap();
         if position.iter().any(|y| !y.is_nan()) {
             recogniser.estimate().unwrap();
+            recogniser.write_continuation(&[time, time + 0.1], &mut ahead, &mut deviation).unwrap();
         }
     }
     assert_eq!(allocations() - before, 0);
+    let whole = recogniser.continuation(&[time, time + 0.1]).unwrap();
+    assert!(whole.position.iter().eq(&ahead) && whole.deviation.iter().eq(&deviation));
+    assert!(recogniser.write_continuation(&[time], &mut ahead, &mut deviation).is_err(), "a wrong length");
 }
 
 /// From half of a new movement, goal and duration are known to a few hundredths of their range.

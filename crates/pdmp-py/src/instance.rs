@@ -8,6 +8,7 @@ use crate::conditions::Conditions;
 use crate::convert::quoted;
 use crate::demonstration::Demonstration;
 use crate::limits::Limits;
+use crate::prior::Prior;
 use crate::via_point::ViaPoint;
 use crate::via_points::AdditionalForcing;
 
@@ -39,6 +40,11 @@ pub(crate) fn forcing<'a>(
     value: &'a Bound<'_, PyAny>,
 ) -> PyResult<&'a std::sync::Arc<pdmp_core::dynamics::AdditionalForcing>> {
     instance(name, value, "pdmp.AdditionalForcing").map(|forcing: &AdditionalForcing| &forcing.0)
+}
+
+/// Returns the prior that an argument holds.
+pub(crate) fn prior<'a>(value: &'a Bound<'_, PyAny>) -> PyResult<&'a pdmp_core::inference::Prior> {
+    instance("prior", value, "pdmp.Prior, from Model.prior").map(|prior: &Prior| &prior.0)
 }
 
 fn instance<'a, T>(name: &str, value: &'a Bound<'_, PyAny>, expected: &str) -> PyResult<&'a T>

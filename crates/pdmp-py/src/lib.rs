@@ -28,6 +28,7 @@ mod labelled;
 mod limits;
 mod model;
 mod model_controllers;
+mod model_file;
 mod model_getters;
 mod motion;
 mod named_contexts;
@@ -92,7 +93,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(conditions::blend, module)?)?;
     module.add_function(wrap_pyfunction!(factorization::factorise, module)?)?;
     module.add_function(wrap_pyfunction!(inspection::inspected, module)?)?;
-    module.add_function(wrap_pyfunction!(model::load, module)?)?;
+    module.add_function(wrap_pyfunction!(model_file::load, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::resample, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::trim, module)?)?;
     module.add_function(wrap_pyfunction!(preprocessing::split_at, module)?)?;

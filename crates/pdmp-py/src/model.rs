@@ -1,6 +1,5 @@
-//! Models: conditions, styles, predictions and files.
+//! Models: conditions, styles and predictions.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use ndarray::Array3;
@@ -9,10 +8,10 @@ use pdmp_core::learning::{StyleOptions, style_of};
 use pdmp_core::motion::{PredictionBand, TimeGrid, Vary, feasible_prediction, prediction_band};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyString};
+use pyo3::types::PyString;
 
 use crate::conditions::Conditions;
-use crate::convert::{Cube, Matrix, Reduced, Vector, optional, quoted, to_numpy, vector};
+use crate::convert::{Cube, Matrix, Vector, optional, quoted, to_numpy, vector};
 use crate::error::raise;
 use crate::instance;
 use crate::prediction::Prediction;
@@ -23,39 +22,6 @@ use crate::scalar::{Scalar, optional_number};
 /// Models are immutable, their arrays are read-only copies, and they can be pickled.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Model(pub(crate) Arc<pdmp_core::Model>);
-
-/// Reads a model file.
-///
-/// Parameters
-/// ----------
-/// path : path-like
-///     A `.safetensors` file that `Model.save` wrote. Files of unknown origin are safe to load: a file contains no code
-///     and no reference to other files, needs memory and time in proportion to its size, and generates finite numbers
-///     or an error. The checksum detects damage, not intent: the author of a file decides its movements and texts.
-///
-/// Returns
-/// -------
-/// Model
-///
-/// Raises
-/// ------
-/// OSError
-///     The file cannot be read.
-/// ModelFileError
-///     The file is damaged, not a model, or of another version.
-///
-/// Examples
-/// --------
-/// >>> import tempfile, pathlib
-/// >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
-/// >>> model.save(path)
-/// >>> loaded = pdmp.load(path)
-/// >>> np.array_equal(loaded.styles, model.styles)
-/// True
-#[pyfunction]
-pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
-    py.detach(|| pdmp_core::Model::load(&path)).map(|model| Model(Arc::new(model))).map_err(raise)
-}
 
 #[pymethods]
 impl Model {
@@ -335,60 +301,5 @@ impl Model {
         let PredictionBand { lower, upper } =
             py.detach(|| prediction_band(&self.0, &prediction, level, grid)).map_err(raise)?;
         Ok((lower.into_pyarray(py), upper.into_pyarray(py)))
-    }
-
-    /// Writes a model file.
-    ///
-    /// The file is replaced atomically: an interrupted call leaves the old one. A killed process may leave a temporary
-    /// file `.pdmp-*.draft` beside it.
-    ///
-    /// Parameters
-    /// ----------
-    /// path : path-like
-    ///     File to write, conventionally with the suffix `.safetensors`.
-    ///
-    /// Raises
-    /// ------
-    /// OSError
-    ///     The file cannot be written, or its folder does not exist.
-    ///
-    /// Examples
-    /// --------
-    /// >>> import tempfile, pathlib
-    /// >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
-    /// >>> model.save(path)
-    /// >>> path.exists()
-    /// True
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| self.0.save(&path)).map_err(raise)
-    }
-
-    /// Returns the contents of a model file as bytes.
-    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &py.detach(|| self.0.to_bytes()).map_err(raise)?))
-    }
-
-    /// Reads a model from the contents of a model file.
-    ///
-    /// Parameters
-    /// ----------
-    /// data : bytes
-    ///     Result of `to_bytes`, or the contents of a file that `save` wrote.
-    ///
-    /// Returns
-    /// -------
-    /// Model
-    ///
-    /// Raises
-    /// ------
-    /// ModelFileError
-    ///     The data are damaged, not a model, or of another version.
-    #[staticmethod]
-    fn from_bytes(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
-        py.detach(|| pdmp_core::Model::from_bytes(data)).map(|model| Self(Arc::new(model))).map_err(raise)
-    }
-
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,).into_pyobject(py)?))
     }
 }

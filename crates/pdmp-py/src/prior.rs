@@ -1,5 +1,7 @@
 //! Prior distributions of the parameters of a movement.
 
+use std::path::PathBuf;
+
 use pdmp_core::inference::{BandFactors, Calibration, Settings};
 use pdmp_core::learning::learn_prior;
 use pyo3::exceptions::PyTypeError;
@@ -19,7 +21,7 @@ use crate::scalar::Scalar;
 ///
 ///     p(θ, log T) = 1/M Σₘ N(μ + √(1−c²)(θₘ − μ), c²Σ)
 ///
-/// Priors are immutable and can be pickled.
+/// Priors are immutable and can be pickled. `Model.save` keeps a prior in the file of its model.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Prior(pub(crate) pdmp_core::inference::Prior);
 
@@ -62,6 +64,55 @@ impl Prior {
             factors,
         );
         Ok((py.get_type::<Self>().getattr("_of")?, arguments.into_pyobject(py)?))
+    }
+
+    /// Reads the prior that `Model.save` has written into the file of its model.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     A model file; `pdmp.load` reads the model from it.
+    ///
+    /// Returns
+    /// -------
+    /// Prior
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     The file cannot be read.
+    /// ModelFileError
+    ///     The file is damaged, not a model, without a prior, or of another version.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import tempfile, pathlib
+    /// >>> path = pathlib.Path(tempfile.mkdtemp()) / "reach.safetensors"
+    /// >>> model.save(path, prior=model.prior(demos))
+    /// >>> recogniser = pdmp.load(path).recogniser(pdmp.Prior.load(path))
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        py.detach(|| pdmp_core::inference::Prior::load(&path)).map(Self).map_err(raise)
+    }
+
+    /// Reads the prior from the contents of a model file.
+    ///
+    /// Parameters
+    /// ----------
+    /// data : bytes
+    ///     Result of `Model.to_bytes` with a prior, or the contents of a file.
+    ///
+    /// Returns
+    /// -------
+    /// Prior
+    ///
+    /// Raises
+    /// ------
+    /// ModelFileError
+    ///     The data are damaged, not a model, without a prior, or of another version.
+    #[staticmethod]
+    fn from_bytes(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
+        py.detach(|| pdmp_core::inference::Prior::from_bytes(data)).map(Self).map_err(raise)
     }
 
     /// Parameters (M, K) of the demonstrations: style, goal and start, or style and anchor.

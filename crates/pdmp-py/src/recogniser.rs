@@ -4,15 +4,13 @@ use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pdmp_core::Kind;
 use pdmp_core::inference::Timing;
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::conditions::Conditions;
-use crate::convert::{quoted, refill, to_numpy, vector};
+use crate::convert::{refill, to_numpy, vector};
 use crate::error::raise;
 use crate::instance;
 use crate::model::Model;
-use crate::prior::Prior;
 use crate::scalar::{Scalar, optional_number};
 
 /// Estimate of a movement from a part of it, returned by `Recogniser.estimate`.
@@ -222,20 +220,14 @@ impl Model {
         starts: Option<&Bound<'_, PyAny>>,
         duration: Option<Scalar<'_>>,
     ) -> PyResult<Recogniser> {
-        let prior: &Prior = match prior.cast::<Prior>() {
-            Ok(prior) => prior.get(),
-            Err(_) => {
-                let text = format!("prior = {}: expected pdmp.Prior, from Model.prior", quoted(prior));
-                return Err(PyTypeError::new_err(text));
-            }
-        };
+        let prior = instance::prior(prior)?;
         let mut timing = Timing { duration: optional_number("duration", duration)?, ..Timing::default() };
         if let Some(starts) = starts {
             let [earliest, latest] = instance::pair("starts", starts, "numbers")?;
             timing.starts =
                 [crate::scalar::number("starts[0]", &earliest)?, crate::scalar::number("starts[1]", &latest)?];
         }
-        let inner = pdmp_core::inference::Recogniser::new(&self.0, &prior.0, timing).map_err(raise)?;
+        let inner = pdmp_core::inference::Recogniser::new(&self.0, prior, timing).map_err(raise)?;
         Ok(Recogniser { inner, kind: self.0.kind(), position: Vec::new() })
     }
 }

@@ -1,5 +1,8 @@
 //! Factors by which the bands of a recogniser are scaled, from cross-validation.
 
+use crate::error::Result;
+use crate::validate::check_range;
+
 /// Shares of a movement that was seen at which the factors are measured.
 pub(crate) const SHARES: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
 
@@ -41,6 +44,17 @@ pub struct Calibration(pub [BandFactors; SHARES.len()]);
 impl Calibration {
     /// Calibration of a model whose assumptions hold.
     pub const NONE: Self = Self([BandFactors::ONE; SHARES.len()]);
+
+    /// Checks that all factors are positive, and that their squares are finite.
+    ///
+    /// # Errors
+    /// A factor is not.
+    pub(crate) fn check(&self) -> Result<()> {
+        let of = |&BandFactors { position, goal, duration, misfit }: &BandFactors| [position, goal, duration, misfit];
+        let valid = |factor: f64| (1e-100..=1e100).contains(&factor);
+        let allowed = "must lie between 1e-100 and 1e100";
+        self.0.iter().flat_map(of).try_for_each(|factor| check_range("calibration", factor, valid(factor), allowed))
+    }
 
     /// Returns the factors at a share, linear between the measured ones and constant beyond.
     pub(crate) fn at(&self, share: f64) -> BandFactors {

@@ -10,6 +10,7 @@ mod constraints;
 mod continuation;
 mod estimate;
 mod evidence;
+mod file;
 mod linear_path;
 mod movement_table;
 mod noise_filter;

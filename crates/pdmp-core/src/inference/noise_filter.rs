@@ -28,6 +28,13 @@ impl NoiseFilter {
         Self { correlation_time, uncertain, decay: 0.0, gains: vec![None; variances.len()], variances }
     }
 
+    /// Returns to the state before the first observation, without allocation.
+    pub(crate) fn restart(&mut self) {
+        self.uncertain.iter_mut().zip(&self.variances).for_each(|(own, variance)| *own = (1.0 - WHITE) * variance);
+        self.decay = 0.0;
+        self.gains.fill(None);
+    }
+
     /// Advances by an interval in seconds to an observation, of which missing DoFs are NaN.
     pub(crate) fn advance(&mut self, interval: f64, position: &[f64]) {
         self.decay = (-interval / self.correlation_time).exp();

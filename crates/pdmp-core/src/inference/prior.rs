@@ -5,6 +5,7 @@ use ndarray::{Array2, ArrayView2, Axis};
 use super::calibration::Calibration;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
+use crate::model::Model;
 use crate::validate::{check_finite, check_length, check_matrix, check_range};
 
 /// Smallest number of demonstrations of a prior.
@@ -82,7 +83,8 @@ impl Prior {
     /// ```
     ///
     /// # Errors
-    /// Fewer than three demonstrations, lengths that do not match, numbers that are not finite, or settings out of range.
+    /// Fewer than three demonstrations, lengths that do not match, numbers that are not finite, durations outside of 1e-9 to
+    /// 1e9 s, or settings or factors out of range.
     pub fn new(
         kind: Kind,
         parameters: Array2<f64>,
@@ -94,6 +96,9 @@ impl Prior {
         check_matrix("parameters", parameters.view())?;
         check_length("log_durations", log_durations.len(), parameters.nrows(), "demonstration")?;
         check_finite("log_durations", &log_durations)?;
+        let allowed = "must be the logarithms of durations between 1e-9 and 1e9 s";
+        let valid = |log: f64| log.abs() <= 20.8;
+        log_durations.iter().try_for_each(|&log| check_range("log_durations", log, valid(log), allowed))?;
         check_finite("residual", &residual)?;
         if parameters.nrows() < MIN_DEMOS {
             let problem = "of fewer than three demonstrations: a prior needs at least three";
@@ -109,21 +114,25 @@ impl Prior {
                 per: "style, and goal and start of each DoF",
             });
         }
-        let positive = "must be positive and finite";
-        residual.iter().try_for_each(|&sd| check_range("residual", sd, sd > 0.0, positive))?;
+        let allowed = "must lie between 1e-100 and 1e100";
+        let valid = |sd: f64| (1e-100..=1e100).contains(&sd);
+        residual.iter().try_for_each(|&sd| check_range("residual", sd, valid(sd), allowed))?;
+        calibration.check()?;
         let n_styles = parameters.ncols() - n_positions;
+        // Rounding depends on the order in memory.
+        let parameters = parameters.as_standard_layout().into_owned();
         Self { kind, n_styles, parameters, log_durations, residual, settings, calibration }.with_settings(settings)
     }
 
     /// Returns the prior with other settings.
     ///
     /// # Errors
-    /// A bandwidth or exponent outside (0, 1], or a correlation time that is not positive.
+    /// A bandwidth or exponent outside 1e-6 to 1, or a correlation time that is not positive.
     pub(crate) fn with_settings(self, settings: Settings) -> Result<Self> {
-        let share = |value: f64| value > 0.0 && value <= 1.0;
+        let share = |value: f64| (1e-6..=1.0).contains(&value);
         let Settings { bandwidth, tempering, correlation_time } = settings;
-        check_range("bandwidth", bandwidth, share(bandwidth), "must lie in (0, 1]")?;
-        check_range("tempering", tempering, share(tempering), "must lie in (0, 1]")?;
+        check_range("bandwidth", bandwidth, share(bandwidth), "must lie between 1e-6 and 1")?;
+        check_range("tempering", tempering, share(tempering), "must lie between 1e-6 and 1")?;
         let valid = (1e-9..=1e9).contains(&correlation_time);
         check_range("correlation_time", correlation_time, valid, "seconds must lie between 1e-9 and 1e9")?;
         Ok(Self { settings, ..self })
@@ -132,6 +141,20 @@ impl Prior {
     /// Returns the prior with another calibration.
     pub(crate) fn with_calibration(self, calibration: Calibration) -> Self {
         Self { calibration, ..self }
+    }
+
+    /// Checks that the prior may be one of a model.
+    ///
+    /// # Errors
+    /// Its kind, styles or degrees of freedom differ.
+    pub(crate) fn check_model(&self, model: &Model) -> Result<()> {
+        let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
+        let same = self.kind == model.kind() && self.residual.len() == model.n_dofs();
+        if !same || self.parameters.ncols() != n_parameters {
+            let problem = "is of another model: its kind, styles or degrees of freedom differ";
+            return Err(Error::Argument { name: "prior", problem });
+        }
+        Ok(())
     }
 
     /// Returns the kind of movement.

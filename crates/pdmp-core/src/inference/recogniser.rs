@@ -5,7 +5,7 @@ use super::estimate::{Estimate, MIN_WEIGHT};
 use super::evidence::{Belief, Kernels, Scratch};
 use super::movement_table::MovementTable;
 use super::noise_filter::NoiseFilter;
-use super::prior::{Moments, Prior, frame_size};
+use super::prior::{Moments, Prior};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::Model;
@@ -113,7 +113,7 @@ pub struct Recogniser {
     pub(crate) information: Vec<f64>,
     pub(crate) beliefs: Vec<Belief>,
     pub(crate) scratch: Scratch,
-    row: Vec<f64>,
+    pub(crate) row: Vec<f64>,
     /// Times of the first and the last observation, in seconds.
     pub(crate) times: Option<[f64; 2]>,
     /// Number of observed positions.
@@ -133,12 +133,7 @@ impl Recogniser {
 
     /// Creates a recogniser as [`Self::new`] does, with a number of hypotheses of the duration.
     pub(crate) fn with_durations(model: &Model, prior: &Prior, timing: Timing, n_durations: usize) -> Result<Self> {
-        let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
-        let same = prior.kind() == model.kind() && prior.residual().len() == model.n_dofs();
-        if !same || prior.parameters().ncols() != n_parameters {
-            let problem = "is of another model: its kind, styles or degrees of freedom differ";
-            return Err(Error::Argument { name: "prior", problem });
-        }
+        prior.check_model(model)?;
         check_linear(model)?;
         let moments = prior.moments();
         let table = MovementTable::new(model.primitive(), prior, &moments)?;
@@ -163,11 +158,11 @@ impl Recogniser {
         })
     }
 
-    /// Forgets all observations.
+    /// Forgets all observations. Does not allocate.
     pub fn reset(&mut self) {
         let Self { processes, information, .. } = self;
         processes.iter_mut().chain(information).for_each(|value| *value = 0.0);
-        self.noise = NoiseFilter::new(self.prior.residual(), self.prior.settings().correlation_time);
+        self.noise.restart();
         (self.times, self.n_observed, self.stage) = (None, 0, Stage::Observed);
     }
 
@@ -269,7 +264,7 @@ impl Recogniser {
             belief.update(information, hypothesis.log, &self.kernels, &mut self.scratch);
         }
         let largest = self.beliefs.iter().map(|belief| belief.weight).fold(f64::NEG_INFINITY, f64::max);
-        if !largest.is_finite() {
+        if !largest.is_finite() || self.beliefs.iter().any(|belief| belief.weight.is_nan()) {
             let problem = "are too far from the demonstrations: check their units";
             return Err(Error::Argument { name: "observations", problem });
         }

@@ -24,11 +24,11 @@ fn reaches() -> Vec<Demonstration> {
     (0..12).map(|_| reach(random.between(0.1, 0.5), random.scale(0.8, 1.3), random.between(0.4, 0.8))).collect()
 }
 
-fn model() -> Model {
+pub(super) fn model() -> Model {
     fit(&reaches(), &FitOptions::new(Kind::Discrete)).unwrap()
 }
 
-fn prior(model: &Model, bandwidth: f64) -> Prior {
+pub(super) fn prior(model: &Model, bandwidth: f64) -> Prior {
     let demonstrated = model.demonstrated();
     let parts = [demonstrated.styles.view(), demonstrated.goals.view(), demonstrated.starts.view()];
     let parameters = ndarray::concatenate(ndarray::Axis(1), &parts).unwrap();

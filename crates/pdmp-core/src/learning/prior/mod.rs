@@ -202,5 +202,6 @@ fn quantile(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let rank = (COVERAGE * (values.len() + 1) as f64).ceil() as usize;
     let last = values.len().saturating_sub(1);
-    values.get(rank.saturating_sub(1).min(last)).copied().unwrap_or(BAND).max(1e-6)
+    let value = values.get(rank.saturating_sub(1).min(last)).copied().filter(|value| !value.is_nan());
+    value.unwrap_or(BAND).clamp(1e-6, 1e6)
 }

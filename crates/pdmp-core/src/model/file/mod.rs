@@ -1,7 +1,8 @@
 //! Model files: safetensors, with the constants as JSON in the metadata.
 //!
 //! The JSON has a single metadata key, because the order of several would be random. A checksum over the constants and
-//! all arrays detects damage that leaves every shape intact. It is not a signature: anyone can write a valid file.
+//! all arrays detects damage that leaves every shape intact. It is not a signature: anyone can write a valid file. A file may
+//! contain the prior of the model too ([`section`]), with a version of its own.
 //!
 //! A file of unknown origin is data. It contains no code and refers to no other file. A loaded model moves in finite
 //! numbers or returns an error. Reading takes memory and time in proportion to the size of the file: header, number of
@@ -12,6 +13,7 @@
 mod draft;
 mod header;
 mod read;
+pub(crate) mod section;
 mod write;
 
 use std::fmt::Display;
@@ -45,6 +47,9 @@ struct Sealed {
     schema: u32,
     crc32: u32,
     model: Constants,
+    /// Version of the prior; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    prior: Option<u32>,
 }
 
 /// Fields of a model that are not arrays.
@@ -209,10 +214,18 @@ fn check_size(bytes: &[u8]) -> Result<()> {
     }
 }
 
-/// Returns the CRC-32 of the constants and of the names and bytes of all arrays, in the order of `Model::arrays`.
-fn checksum<'a>(constants: &Constants, arrays: impl Iterator<Item = (&'a str, &'a [u8])>) -> Result<u32> {
+/// Returns the CRC-32 of the constants, the version of the prior, and the names and bytes of all arrays: those of
+/// `Model::arrays`, then those of the prior.
+fn checksum<'a>(
+    constants: &Constants,
+    prior: Option<u32>,
+    arrays: impl Iterator<Item = (&'a str, &'a [u8])>,
+) -> Result<u32> {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&serde_json::to_vec(constants).map_err(unreadable)?);
+    if let Some(version) = prior {
+        hasher.update(&version.to_le_bytes());
+    }
     for (name, bytes) in arrays {
         hasher.update(name.as_bytes());
         hasher.update(bytes);

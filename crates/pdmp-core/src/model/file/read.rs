@@ -6,6 +6,7 @@ use ndarray::{Array2, Axis};
 use safetensors::tensor::{Dtype, SafeTensors};
 use serde::Deserialize;
 
+use super::section::{PREFIX, Section};
 use super::{Constants, Layout, Map, SCHEMA, Sealed, checksum, ensure, header, unreadable};
 use crate::context::{ContextMap, ContextMapKind, Kernel, MapParameters, StackingWeights};
 use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
@@ -26,11 +27,19 @@ use crate::numerics::smoothing_spline::Noise;
 use crate::validate::MAX_MAGNITUDE;
 
 impl Model {
-    /// Reads a model from the bytes of a file.
+    /// Reads a model from the bytes of a file; a prior in it is checked for damage alone.
     ///
     /// # Errors
     /// Bytes that are damaged, not a model, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        Ok(Self::from_bytes_with_prior(bytes)?.0)
+    }
+
+    /// Reads a model, and its prior if there is one, from the bytes of a file.
+    ///
+    /// # Errors
+    /// As for [`Self::from_bytes`].
+    pub(crate) fn from_bytes_with_prior(bytes: &[u8]) -> Result<(Self, Option<Section>)> {
         let json = header::constants(bytes)?;
         // The version is parsed first: other versions may have other fields.
         let version: Version = serde_json::from_str(&json).map_err(unreadable)?;
@@ -42,7 +51,11 @@ impl Model {
         // as 1.50 for 1.5, which differs from the text that `to_bytes` writes.
         let canonical = serde_json::to_string(&sealed).map_err(unreadable)?;
         ensure(canonical == json, "damaged: the text of its constants is not canonical")?;
-        Reader { tensors }.model(sealed.model, sealed.crc32)
+        let reader = Reader { tensors };
+        let model = reader.model(&sealed.model)?;
+        let prior = sealed.prior.map(|version| reader.section(version)).transpose()?;
+        reader.verify(&sealed, &model, prior.as_ref())?;
+        Ok((model, prior))
     }
 }
 
@@ -99,7 +112,7 @@ impl Reader<'_> {
         tensor.shape().try_into().map_err(|_| unreadable(format!("{name} has {} axes", tensor.shape().len())))
     }
 
-    fn model(&self, constants: Constants, crc32: u32) -> Result<Model> {
+    fn model(&self, constants: &Constants) -> Result<Model> {
         let kind = constants.canonical.kind();
         let [n_demos, n_styles] = self.shape("styles")?;
         let [n_knots, _, n_dofs] = self.shape("forcing_table.values")?;
@@ -165,7 +178,7 @@ impl Reader<'_> {
         let learnt = FitSummary {
             n_samples: constants.n_samples,
             noise: self.noise(n_dofs)?,
-            template: self.template(&constants, n_segments, n_dofs)?,
+            template: self.template(constants, n_segments, n_dofs)?,
             dof_scale,
             singular_values,
             truncation_error: constants.truncation_error,
@@ -189,9 +202,7 @@ impl Reader<'_> {
             Some(layout) => self.coordinates(layout, primitive)?,
             None => Arc::new(primitive),
         };
-        let model = Model { primitive, demonstrated, learnt, map };
-        self.verify(&constants, &model, crc32)?;
-        Ok(model)
+        Ok(Model { primitive, demonstrated, learnt, map })
     }
 
     /// Returns a primitive with the coordinates of the file.
@@ -262,13 +273,25 @@ impl Reader<'_> {
         Ok((ratios, weights))
     }
 
-    /// Checks that the file contains the arrays of the model and no others, and compares the checksum.
-    fn verify(&self, constants: &Constants, model: &Model, crc32: u32) -> Result<()> {
-        let names: Vec<&str> = model.arrays().iter().map(|(name, ..)| *name).collect();
+    /// Returns the arrays of the prior.
+    fn section(&self, version: u32) -> Result<Section> {
+        let names = self.tensors.names().into_iter().filter_map(|name| name.strip_prefix(PREFIX));
+        names.into_iter().try_fold(Section::new(version), |section, name| {
+            let full = format!("{PREFIX}{name}");
+            let tensor = self.tensors.tensor(&full).map_err(unreadable)?;
+            Ok(section.with_array(name, tensor.shape(), self.array(&full, tensor.shape())?))
+        })
+    }
+
+    /// Checks that the file contains the arrays of the model and of the prior and no others, and compares the checksum.
+    fn verify(&self, sealed: &Sealed, model: &Model, prior: Option<&Section>) -> Result<()> {
+        let arrays = model.arrays();
+        let others = prior.into_iter().flat_map(|prior| prior.arrays.keys().map(String::as_str));
+        let names: Vec<&str> = arrays.iter().map(|(name, ..)| *name).chain(others).collect();
         ensure(names.len() == self.tensors.len(), "it contains arrays that do not belong to a model")?;
         let tensors: Vec<_> = names.iter().filter_map(|name| self.tensors.tensor(name).ok()).collect();
-        let found = checksum(constants, names.iter().copied().zip(tensors.iter().map(|tensor| tensor.data())))?;
-        ensure(found == crc32, "damaged: the checksum does not match")
+        let data = names.iter().copied().zip(tensors.iter().map(|tensor| tensor.data()));
+        ensure(checksum(&sealed.model, sealed.prior, data)? == sealed.crc32, "damaged: the checksum does not match")
     }
 }
 

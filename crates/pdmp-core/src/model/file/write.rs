@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 
+use super::section::Section;
 use super::{Constants, KEY, Layout, Map, SCHEMA, Sealed, checksum, header, unreadable};
 use crate::context::{ContextMap, MapParameters, StackingWeights};
 use crate::dynamics::hermite_table::KnotTable;
@@ -22,12 +23,24 @@ fn vector(name: &'static str, vector: &[f64]) -> Array {
     (name, vec![vector.len()], vector.to_vec())
 }
 
+fn little_endian(data: &[f64]) -> Vec<u8> {
+    data.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
 impl Model {
     /// Returns the model as the bytes of a file.
     ///
     /// # Errors
     /// A model that exceeds the limits of the format.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        self.to_bytes_with(None)
+    }
+
+    /// Returns the model, with its prior if there is one, as the bytes of a file.
+    ///
+    /// # Errors
+    /// As for [`Self::to_bytes`].
+    pub(crate) fn to_bytes_with(&self, prior: Option<&Section>) -> Result<Vec<u8>> {
         let constants = Constants {
             canonical: self.canonical(),
             tau: self.tau,
@@ -45,13 +58,16 @@ impl Model {
             map: self.map.as_ref().map(Map::of),
             coordinates: self.coordinates().map(Layout::of),
         };
+        let others = prior.into_iter().flat_map(|prior| &prior.arrays);
         let arrays: Vec<(&str, Vec<usize>, Vec<u8>)> = self
             .arrays()
             .into_iter()
-            .map(|(name, shape, data)| (name, shape, data.iter().flat_map(|x| x.to_le_bytes()).collect()))
+            .map(|(name, shape, data)| (name, shape, little_endian(&data)))
+            .chain(others.map(|(name, (shape, data))| (name.as_str(), shape.clone(), little_endian(data))))
             .collect();
-        let crc32 = checksum(&constants, arrays.iter().map(|(name, _, bytes)| (*name, bytes.as_slice())))?;
-        let sealed = Sealed { schema: SCHEMA, crc32, model: constants };
+        let version = prior.map(|prior| prior.version);
+        let crc32 = checksum(&constants, version, arrays.iter().map(|(name, _, bytes)| (*name, bytes.as_slice())))?;
+        let sealed = Sealed { schema: SCHEMA, crc32, model: constants, prior: version };
         let json = serde_json::to_string(&sealed).map_err(unreadable)?;
         let views = arrays
             .iter()
