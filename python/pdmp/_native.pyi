@@ -233,11 +233,12 @@ def fit(
     demos : sequence or mapping of Demonstration, Trajectory or array_like (T, D), or array_like (M, T, D), or blocks
         Demonstrations of one skill. A rhythmic one is a single cycle without its end point. Of a mapping, as the
         readers return, the values are used. The columns of data frames name the degrees of freedom. More demonstrations
-        than memory holds are passed in blocks: a list of lists, or a function without arguments that returns an
-        iterable of lists or arrays (B, T, D), the same at each of two to four calls. Memory then holds one block, a
-        triangular factor of C·D columns and a few numbers for each demonstration; the model is the same but for
-        rounding. Contexts are then those of the demonstrations; warps, landmarks, rotations and `n_styles="auto"` need
-        all demonstrations at once.
+        than memory holds are passed in blocks: a list of blocks, or a function without arguments that returns an
+        iterable of them, the same at each of two to four calls. A block is a list of demonstrations, an array (B, T, D),
+        or a function that returns one, as `io.read_blocks` gives for files. Memory then holds one block, a triangular
+        factor of C·D columns and a few numbers for each demonstration; the model is the same but for rounding. Contexts
+        are then those of the demonstrations; warps, landmarks, rotations and `n_styles="auto"` need all demonstrations
+        at once.
     kind : {"discrete", "rhythmic"}
         Movement from a start to a goal, or around an anchor, the default for the result of `preprocessing.cycles`.
     dt : float, optional
