@@ -2,9 +2,11 @@
 
 use ndarray::Array2;
 
-use super::estimate::MIN_WEIGHT;
+use super::evidence::Belief;
 use super::recogniser::Recogniser;
+use super::triangle::square;
 use crate::error::Result;
+use crate::numerics::simd::F64x4;
 use crate::validate::{check_number, check_range, zeros};
 
 /// Positions to come.
@@ -28,16 +30,13 @@ impl Recogniser {
         let position = self.mean_continuation(time)?;
         let factor = self.factors(duration).position;
         let mut deviation: Array2<f64> = zeros("continuation", position.dim())?;
-        let mut row = vec![0.0; self.table.width];
-        for h in self.active() {
-            for ((k, d), square) in deviation.indexed_iter_mut() {
-                let (mean, residual) = self.ahead(h, time[k], d, &mut row);
-                let along = self.beliefs[h].variance(&mut row[..self.table.n_directions]);
-                *square += self.beliefs[h].weight * ((mean - position[[k, d]]).powi(2) + along + residual);
-            }
-        }
         let sum = self.sum_of_weights();
-        deviation.mapv_inplace(|square| factor * (square / sum).sqrt());
+        self.ahead(time, |belief, k, d, mean, residual, row| {
+            let error = mean - F64x4::splat(position[[k, d]]);
+            let variance = error * error + square::<F64x4>(&belief.covariance, row) + F64x4::splat(residual);
+            deviation[[k, d]] += (belief.weight * variance).reduce_add() / sum;
+        });
+        deviation.mapv_inplace(|square| factor * square.sqrt());
         Ok(Continuation { time: time.to_vec(), position, deviation })
     }
 
@@ -53,34 +52,40 @@ impl Recogniser {
             check_range("time", t, t >= last, "must not be before the last observation")?;
         }
         let mut position: Array2<f64> = zeros("continuation", (time.len(), self.prior.residual().len()))?;
-        let mut row = vec![0.0; self.table.width];
         let sum = self.sum_of_weights();
-        for h in self.active() {
-            for ((k, d), mean) in position.indexed_iter_mut() {
-                *mean += self.beliefs[h].weight / sum * self.ahead(h, time[k], d, &mut row).0;
-            }
-        }
+        self.ahead(time, |belief, k, d, mean, _, _| {
+            position[[k, d]] += (belief.weight * mean).reduce_add() / sum;
+        });
         Ok(position)
     }
 
-    /// Returns the mean position of a DoF under a hypothesis and the variance of the residual; `row` becomes that of the
-    /// table.
-    fn ahead(&self, h: usize, time: f64, dof: usize, row: &mut [f64]) -> (f64, f64) {
+    /// Calls a function for four hypotheses after four, every time and DoF, with the mean positions, the variance of the
+    /// residual, and the row (q,) of the table.
+    fn ahead(&self, time: &[f64], mut predicted: impl FnMut(&Belief, usize, usize, F64x4, f64, &[F64x4])) {
         let [first, last] = self.times.unwrap_or_default();
-        let (q, mean) = (self.table.n_directions, &self.beliefs[h].mean);
-        self.table.row(self.hypotheses[h].fraction(time - first), dof, row);
-        let process = &self.processes[(h * self.prior.residual().len() + dof) * self.table.width..][..=q];
-        let along = |values: &[f64]| values.iter().zip(mean).map(|(a, b)| a * b).sum::<f64>();
-        let (decay, variance) = self.noise.ahead(time - last, dof);
-        (row[q] + along(row) + decay * (process[q] - along(process)), variance)
-    }
-
-    /// Returns the hypotheses whose weights count.
-    fn active(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.beliefs.len()).filter(|&h| self.beliefs[h].weight > MIN_WEIGHT)
+        let (q, width) = (self.table.n_directions, self.table.width);
+        let mut row = vec![F64x4::ZERO; width];
+        for ((belief, sums), four) in self.beliefs.iter().zip(&self.sums).zip(&self.fours) {
+            if !belief.counts() {
+                continue;
+            }
+            let along = |values: &[F64x4]| {
+                values.iter().zip(&belief.mean).fold(F64x4::ZERO, |sum, (value, mean)| sum + *value * *mean)
+            };
+            for (k, &t) in time.iter().enumerate() {
+                let places = self.table.places(four.fraction(t - first));
+                for (d, process) in sums.processes.chunks_exact(width).enumerate() {
+                    self.table.rows::<F64x4>(&places, d, &mut row);
+                    let (decay, variance) = self.noise.ahead(t - last, d);
+                    let residual = process[q] - along(process);
+                    let mean = row[q] + along(&row) + residual * F64x4::splat(decay);
+                    predicted(belief, k, d, mean, variance, &row[..q]);
+                }
+            }
+        }
     }
 
     fn sum_of_weights(&self) -> f64 {
-        self.active().map(|h| self.beliefs[h].weight).sum()
+        self.beliefs.iter().filter(|belief| belief.counts()).map(|belief| belief.weight.reduce_add()).sum()
     }
 }

@@ -13,9 +13,11 @@ mod evidence;
 mod linear_path;
 mod movement_table;
 mod noise_filter;
+mod observation;
 mod passage;
 pub(crate) mod prior;
 pub(crate) mod recogniser;
+mod triangle;
 mod via_points;
 
 pub(crate) use calibration::SHARES;
