@@ -21,7 +21,8 @@ pub struct Continuation {
 }
 
 impl Recogniser {
-    /// Predicts the positions at times (T,) in seconds, from the last observation on.
+    /// Predicts the positions at times (T,) in seconds, from the last observation on. A movement that is stopped goes on at
+    /// once.
     ///
     /// # Errors
     /// A time before the last observation or not finite, and as for [`Recogniser::estimate`].
@@ -62,7 +63,7 @@ impl Recogniser {
     /// Calls a function for four hypotheses after four, every time and DoF, with the mean positions, the variance of the
     /// residual, and the row (q,) of the table.
     fn ahead(&self, time: &[f64], mut predicted: impl FnMut(&Belief, usize, usize, F64x4, f64, &[F64x4])) {
-        let [first, last] = self.times.unwrap_or_default();
+        let [_, last] = self.times.unwrap_or_default();
         let (q, width) = (self.table.n_directions, self.table.width);
         let mut row = vec![F64x4::ZERO; width];
         for ((belief, sums), four) in self.beliefs.iter().zip(&self.sums).zip(&self.fours) {
@@ -73,7 +74,7 @@ impl Recogniser {
                 values.iter().zip(&belief.mean).fold(F64x4::ZERO, |sum, (value, mean)| sum + *value * *mean)
             };
             for (k, &t) in time.iter().enumerate() {
-                let places = self.table.places(four.fraction(t - first));
+                let places = self.table.places(four.fraction(self.clock + (t - last)));
                 for (d, process) in sums.processes.chunks_exact(width).enumerate() {
                     self.table.rows::<F64x4>(&places, d, &mut row);
                     let (decay, variance) = self.noise.ahead(t - last, d);

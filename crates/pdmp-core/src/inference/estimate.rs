@@ -31,6 +31,9 @@ pub struct Estimate {
     pub fraction: f64,
     /// Standard deviation of `fraction`.
     pub fraction_deviation: f64,
+    /// Probability that the movement is stopped. From 0.9 on, its clock rests until it is below 0.5: fraction and positions
+    /// to come are those of a movement that goes on at once, and the arrival is later by the pause.
+    pub stopped: f64,
     /// Mean squared residual, relative to the one that a tenth of the demonstrations exceed: above 1, the movement is
     /// unlike the demonstrations.
     pub surprise: f64,
@@ -49,6 +52,7 @@ impl Estimate {
             arrival: 0.0,
             fraction: 0.0,
             fraction_deviation: 0.0,
+            stopped: 0.0,
             surprise: 0.0,
         }
     }
@@ -94,7 +98,8 @@ impl Estimate {
 impl Recogniser {
     /// Computes the estimate from the weighed hypotheses and the sum of their second moments.
     pub(crate) fn summarise(&mut self) {
-        let [first, last] = self.times.unwrap_or_default();
+        let [_, last] = self.times.unwrap_or_default();
+        let clock = self.clock;
         let (mut log, mut log_square, mut arrival) = (0.0, 0.0, 0.0);
         let (mut fraction, mut fraction_square, mut turn) = (0.0, 0.0, [0.0; 2]);
         let Self { beliefs, hypotheses, estimate, table, scratch, .. } = self;
@@ -104,7 +109,7 @@ impl Recogniser {
             log += weight * hypothesis.log;
             log_square += weight * hypothesis.log * hypothesis.log;
             arrival += weight * (1.0 + hypothesis.start) * hypothesis.duration;
-            let own = hypothesis.fraction(last - first);
+            let own = hypothesis.fraction(clock);
             fraction += weight * own;
             fraction_square += weight * own * own;
             if rhythmic {
@@ -126,7 +131,7 @@ impl Recogniser {
         // The duration of the first hypothesis gives the mean of the demonstrations.
         let duration = (log - hypotheses[0].log).exp() * hypotheses[0].duration;
         estimate.duration = duration;
-        estimate.arrival = first + arrival;
+        estimate.arrival = last - clock + arrival;
         let (factors, resolution) = (self.factors(duration), self.log_resolution());
         let estimate = &mut self.estimate;
         // A goal that is reached is one up to the residual.
@@ -143,6 +148,7 @@ impl Recogniser {
             estimate.fraction = (turn[1].atan2(turn[0]) / TAU).rem_euclid(1.0);
             estimate.fraction_deviation = (-2.0 * length.ln()).sqrt() / TAU;
         }
+        self.estimate.stopped = self.pauses.as_ref().map_or(0.0, |pauses| pauses.probability);
         self.estimate.surprise = self.misfit() / factors.misfit;
     }
 

@@ -15,6 +15,7 @@ mod movement_table;
 mod noise_filter;
 mod observation;
 mod passage;
+mod pauses;
 pub(crate) mod prior;
 pub(crate) mod recogniser;
 mod triangle;

@@ -1,7 +1,7 @@
 //! Whitening of a residual that is correlated over time.
 
 /// Share of the variance of the residual that is white.
-const WHITE: f64 = 0.1;
+pub(crate) const WHITE: f64 = 0.1;
 
 /// Kalman filter of the residual of each DoF, the sum of an Ornstein-Uhlenbeck process and white noise.
 ///
@@ -26,6 +26,13 @@ impl NoiseFilter {
         let variances: Vec<f64> = residual.iter().map(|sd| sd * sd).collect();
         let uncertain = variances.iter().map(|variance| (1.0 - WHITE) * variance).collect();
         Self { correlation_time, uncertain, decay: 0.0, gains: vec![None; variances.len()], variances }
+    }
+
+    /// Returns to the state of another filter of the same residuals.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.decay = other.decay;
+        self.uncertain.copy_from_slice(&other.uncertain);
+        self.gains.copy_from_slice(&other.gains);
     }
 
     /// Advances by an interval in seconds to an observation, of which missing DoFs are NaN.

@@ -42,6 +42,12 @@ impl Sums {
         Self { processes, information: vec![F64x4::ZERO; size(table.n_directions + 1)] }
     }
 
+    /// Returns to sums of the same sizes.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.processes.copy_from_slice(&other.processes);
+        self.information.copy_from_slice(&other.information);
+    }
+
     pub(crate) fn reset(&mut self) {
         self.processes.fill(F64x4::ZERO);
         self.information.fill(F64x4::ZERO);

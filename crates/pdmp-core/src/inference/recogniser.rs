@@ -6,6 +6,7 @@ use super::evidence::{Belief, Kernels, Mean, Scratch, Spread, Weigh};
 use super::movement_table::MovementTable;
 use super::noise_filter::NoiseFilter;
 use super::observation::{Hypotheses, Observe, Sums};
+use super::pauses::Pauses;
 use super::prior::{Moments, Prior, frame_size};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -76,6 +77,9 @@ impl Hypothesis {
 /// sums of outer products of whitened observations: the movement is linear in θ. An observation takes the same time and
 /// memory at any time, and does not allocate.
 ///
+/// The movement may pause. The clock of all hypotheses rests while it does, and what is observed then is no part of the
+/// sums ([`Estimate::stopped`]).
+///
 /// ```
 /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit, rollout};
 /// # use pdmp_core::inference::{Recogniser, Timing};
@@ -114,9 +118,13 @@ pub struct Recogniser {
     pub(crate) sums: Vec<Sums>,
     pub(crate) beliefs: Vec<Belief>,
     pub(crate) scratch: Scratch,
-    rows: Vec<F64x4>,
+    pub(crate) rows: Vec<F64x4>,
     /// Times of the first and the last observation, in seconds.
     pub(crate) times: Option<[f64; 2]>,
+    /// Time from the first to the last observation without pauses, in seconds.
+    pub(crate) clock: f64,
+    /// Filter of pauses, if there may be any.
+    pub(crate) pauses: Option<Pauses>,
     /// Number of observed positions.
     pub(crate) n_observed: usize,
     stage: Stage,
@@ -129,10 +137,13 @@ impl Recogniser {
     /// # Errors
     /// A prior of another model, a model with rotations or a time warp, or times that are not finite.
     pub fn new(model: &Model, prior: &Prior, timing: Timing) -> Result<Self> {
-        Self::with_durations(model, prior, timing, N_DURATIONS)
+        let mut recogniser = Self::with_durations(model, prior, timing, N_DURATIONS)?;
+        recogniser.pauses =
+            Some(Pauses::new(prior, &recogniser.noise, &recogniser.sums, recogniser.table.n_directions));
+        Ok(recogniser)
     }
 
-    /// Creates a recogniser as [`Self::new`] does, with a number of hypotheses of the duration.
+    /// Creates a recogniser of movements without pauses, with a number of hypotheses of the duration.
     pub(crate) fn with_durations(model: &Model, prior: &Prior, timing: Timing, n_durations: usize) -> Result<Self> {
         let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
         let same = prior.kind() == model.kind() && prior.residual().len() == model.n_dofs();
@@ -151,8 +162,10 @@ impl Recogniser {
             sums: vec![Sums::new(&table); fours.len()],
             beliefs: vec![Belief::new(&kernels); fours.len()],
             scratch: Scratch::new(&kernels),
-            rows: vec![F64x4::ZERO; model.n_dofs() * table.width],
+            rows: vec![F64x4::ZERO; model.n_dofs().max(2) * table.width],
             times: None,
+            clock: 0.0,
+            pauses: None,
             n_observed: 0,
             stage: Stage::Observed,
             estimate: Estimate::new(prior),
@@ -168,7 +181,8 @@ impl Recogniser {
     pub fn reset(&mut self) {
         self.sums.iter_mut().for_each(Sums::reset);
         self.noise = NoiseFilter::new(self.prior.residual(), self.prior.settings().correlation_time);
-        (self.times, self.n_observed, self.stage) = (None, 0, Stage::Observed);
+        (self.times, self.clock, self.n_observed, self.stage) = (None, 0.0, 0, Stage::Observed);
+        self.pauses.iter_mut().for_each(Pauses::reset);
     }
 
     /// Returns the number of hypotheses.
@@ -184,8 +198,8 @@ impl Recogniser {
     /// remains as it was.
     pub fn update(&mut self, time: f64, position: &[f64]) -> Result<()> {
         check_length("position", position.len(), self.prior.residual().len(), "DoF")?;
-        let observed = position.iter().enumerate().filter(|(_, y)| !y.is_nan());
-        observed.clone().try_for_each(|(d, &y)| check_number("position", d, y))?;
+        let mut observed = position.iter().enumerate().filter(|(_, y)| !y.is_nan());
+        observed.try_for_each(|(d, &y)| check_number("position", d, y))?;
         check_number("time", 0, time)?;
         let (first, interval) = match self.times {
             None => (time, 0.0),
@@ -199,16 +213,25 @@ impl Recogniser {
                 (first, time - last)
             }
         };
-        self.n_observed += observed.count();
         self.times = Some([first, time]);
         self.stage = Stage::Observed;
+        if self.pauses.as_ref().is_none_or(|pauses| !pauses.stopped) {
+            self.include(interval, position);
+        }
+        self.watch(time, position);
+        Ok(())
+    }
+
+    /// Includes positions (D,) after an interval in seconds of the clock.
+    pub(crate) fn include(&mut self, interval: f64, position: &[f64]) {
+        self.clock += interval;
+        self.n_observed += position.iter().filter(|y| !y.is_nan()).count();
         self.noise.advance(interval, position);
         let Self { table, noise, rows, .. } = self;
         for (four, sums) in self.fours.iter().zip(&mut self.sums) {
-            let places = table.places(four.fraction(time - first));
+            let places = table.places(four.fraction(self.clock));
             compute(Observe { sums, table, places, noise, position, rows });
         }
-        Ok(())
     }
 
     /// Returns the estimate from all observations so far. Does not allocate.
@@ -277,10 +300,9 @@ impl Recogniser {
         self.stage = Stage::Observed;
     }
 
-    /// Returns the share of the movement that was seen at a time, for the estimated duration, and the factors of the bands.
+    /// Returns the factors of the bands for the share of the movement that was seen, of the estimated duration.
     pub(crate) fn factors(&self, duration: f64) -> BandFactors {
-        let [first, last] = self.times.unwrap_or_default();
-        self.prior.calibration().at((last - first) / duration)
+        self.prior.calibration().at(self.clock / duration)
     }
 }
 
