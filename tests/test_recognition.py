@@ -88,6 +88,27 @@ def test_an_unknown_start_is_found(model, prior):
     assert estimate.arrival == pytest.approx(1.0 + 20 * demo.time[1], abs=0.12)
 
 
+def test_a_pause_holds_the_clock(model, prior):
+    """A reach that pauses is stopped, and arrives later by the pause."""
+    demo = reach(0.3, 0.6, 1.0)
+    recogniser = watched(model.recogniser(prior), demo, 25)
+    assert recogniser.estimate().stopped < 0.5
+    dt = demo.time[1]
+    for k in range(25, 65):
+        recogniser.update(k * dt, demo.position[24])
+    estimate = recogniser.estimate()
+    assert estimate.stopped > 0.5
+    assert estimate.fraction == pytest.approx(24 / 60, abs=0.1)
+    assert recogniser.continuation([64 * dt + 0.6]).position == pytest.approx(
+        demo.position[-1:], abs=0.1
+    )
+    for k in range(25, 50):
+        recogniser.update((k + 40) * dt, demo.position[k])
+    estimate = recogniser.estimate()
+    assert estimate.stopped < 0.5
+    assert estimate.arrival == pytest.approx(1.0 + 40 * dt, abs=0.12)
+
+
 def test_the_estimate_depends_on_time_differences_alone(model, prior):
     """A shift of the clock shifts the arrival alone; a reset forgets all."""
     demo = reach(0.3)

@@ -38,7 +38,7 @@ FOREIGN_METHODS = frozenset(
             "shape",
             "sum",
         ),
-        *("try_for_each", "update", "write"),
+        *("sqrt", "try_for_each", "update", "write"),
     }
 )
 """Methods of this library, the standard library and ndarray alike."""

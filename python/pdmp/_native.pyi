@@ -2823,6 +2823,8 @@ class Recogniser:
     At a given clock a movement is linear in style, goal and start, or anchor. Each of 64 hypotheses of the duration has the
     posterior of these under the mixture of the prior, in closed form, and is weighed by its likelihood. An observation
     takes the same time and memory at any time.
+
+    The movement may pause: where it is slow against its prediction, the clock of all hypotheses rests until it goes on.
     """
     @property
     def n_hypotheses(self) -> int:
@@ -2857,7 +2859,7 @@ class Recogniser:
             There is no observation, or the observations are in another unit than the demonstrations.
         """
     def continuation(self, time: ArrayLike) -> Continuation:
-        """Predicts the positions at times from the last observation on.
+        """Predicts the positions at times from the last observation on. A movement that is stopped goes on at once.
 
         Parameters
         ----------
@@ -2914,9 +2916,14 @@ class Estimate:
     def fraction_deviation(self) -> float:
         """Standard deviation of `fraction`."""
     @property
+    def stopped(self) -> float:
+        """Probability that the movement is stopped. From 0.9 on, its clock rests until it is below 0.5: fraction and
+        continuation are those of a movement that goes on at once, and the arrival is later by the pause.
+        """
+    @property
     def surprise(self) -> float:
         """Mean squared residual, relative to that which one in ten held-out demonstrations exceeds. Above 1 the movement is
-        unlike the demonstrations, or pauses.
+        unlike the demonstrations.
         """
 
 @final

@@ -48,6 +48,71 @@ fn observations_allocate_nothing() {
     assert!(recogniser.write_continuation(&[time], &mut ahead, &mut deviation).is_err(), "a wrong length");
 }
 
+/// Shows a reach that pauses for a time in seconds after its first samples, and calls `look` after each sample with the time,
+/// and whether it pauses.
+fn watched(
+    recogniser: &mut Recogniser,
+    movement: &Demonstration,
+    (from, pause): (usize, usize),
+    mut look: impl FnMut(&mut Recogniser, f64, bool),
+) {
+    let mut random = Random(7);
+    for k in 0..movement.n_samples() + pause {
+        let paused = (from..from + pause).contains(&k);
+        let own = if k < from { k } else { from.max(k - pause.min(k)) };
+        let noise = if paused { 0.002 } else { 0.0 };
+        let position = [0, 1, 2].map(|d| movement.position()[[own, d]] + noise * (random.next() - 0.5));
+        recogniser.update(0.01 * k as f64, &position).unwrap();
+        look(recogniser, 0.01 * k as f64, paused);
+    }
+}
+
+/// In a pause the clock rests; afterwards it goes on, and nothing allocates.
+#[test]
+fn a_pause_holds_the_clock() {
+    let (model, prior) = learnt(&recordings(), Kind::Discrete);
+    let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
+    for (from, pause) in [(45, 100), (60, 300)] {
+        recogniser.reset();
+        let new = reach(0.33, 1.1, 0.01);
+        let (mut held, mut later, mut n_stopped) = (0, 0, 0);
+        let before = allocations();
+        watched(&mut recogniser, &new, (from, pause), |recogniser, time, paused| {
+            let estimate = recogniser.estimate().unwrap();
+            n_stopped += usize::from(estimate.stopped > 0.5);
+            let since = time - 0.01 * from as f64;
+            // It is noticed after up to a third of the movement.
+            if paused && since > 0.35 {
+                assert!(estimate.stopped > 0.9, "{from} {pause} {time}: {}", estimate.stopped);
+                assert!((estimate.fraction - from as f64 / 110.0).abs() < 0.1, "{from} {time}: {}", estimate.fraction);
+                held += 1;
+            }
+            if since > 0.01 * pause as f64 + 0.2 && estimate.fraction < 0.9 {
+                let arrival = 1.1 + 0.01 * pause as f64;
+                assert!((estimate.arrival - arrival).abs() < 0.15, "{from} {time}: {} {arrival}", estimate.arrival);
+                later += 1;
+            }
+        });
+        assert_eq!(allocations() - before, 0);
+        assert!(held > pause / 2 && later > 10 && n_stopped < pause + 20, "{held} {later} {n_stopped}");
+    }
+}
+
+/// The clock of a movement without a pause does not rest.
+#[test]
+fn movements_without_pauses_are_not_stopped() {
+    let (model, prior) = learnt(&recordings(), Kind::Discrete);
+    let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
+    for k in 0..20 {
+        recogniser.reset();
+        let new = reach(0.03 * f64::from(k), 0.75 + 0.04 * f64::from((7 * k) % 20), 0.01);
+        watched(&mut recogniser, &new, (0, 0), |recogniser, time, _| {
+            let stopped = recogniser.estimate().unwrap().stopped;
+            assert!(stopped < 0.9, "{k} {time}: {stopped}");
+        });
+    }
+}
+
 /// From half of a new movement, goal and duration are known to a few hundredths of their range.
 #[test]
 fn half_a_movement_gives_the_whole() {

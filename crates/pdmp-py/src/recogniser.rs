@@ -38,8 +38,11 @@ pub(crate) struct Estimate {
     fraction: f64,
     /// Standard deviation of `fraction`.
     fraction_deviation: f64,
+    /// Probability that the movement is stopped. From 0.9 on, its clock rests until it is below 0.5: fraction and
+    /// continuation are those of a movement that goes on at once, and the arrival is later by the pause.
+    stopped: f64,
     /// Mean squared residual, relative to that which one in ten held-out demonstrations exceeds. Above 1 the movement is
-    /// unlike the demonstrations, or pauses.
+    /// unlike the demonstrations.
     surprise: f64,
 }
 
@@ -57,6 +60,7 @@ impl Estimate {
             arrival: (kind == Kind::Discrete).then_some(estimate.arrival),
             fraction: estimate.fraction,
             fraction_deviation: estimate.fraction_deviation,
+            stopped: estimate.stopped,
             surprise: estimate.surprise,
         })
     }
@@ -94,6 +98,8 @@ impl Continuation {
 /// At a given clock a movement is linear in style, goal and start, or anchor. Each of 64 hypotheses of the duration has the
 /// posterior of these under the mixture of the prior, in closed form, and is weighed by its likelihood. An observation
 /// takes the same time and memory at any time.
+///
+/// The movement may pause: where it is slow against its prediction, the clock of all hypotheses rests until it goes on.
 #[pyclass(module = "pdmp")]
 pub(crate) struct Recogniser {
     inner: pdmp_core::inference::Recogniser,
@@ -138,7 +144,7 @@ impl Recogniser {
         self.inner.estimate().map_err(raise).and_then(|estimate| Estimate::new(py, estimate, kind))
     }
 
-    /// Predicts the positions at times from the last observation on.
+    /// Predicts the positions at times from the last observation on. A movement that is stopped goes on at once.
     ///
     /// Parameters
     /// ----------

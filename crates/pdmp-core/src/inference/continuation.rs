@@ -2,9 +2,11 @@
 
 use ndarray::Array2;
 
-use super::estimate::MIN_WEIGHT;
+use super::evidence::Belief;
 use super::recogniser::Recogniser;
+use super::triangle::square;
 use crate::error::Result;
+use crate::numerics::simd::F64x4;
 use crate::validate::{check_length, check_number, check_range, row_major_mut, zeros};
 
 /// Positions to come.
@@ -19,7 +21,8 @@ pub struct Continuation {
 }
 
 impl Recogniser {
-    /// Predicts the positions at times (T,) in seconds, from the last observation on.
+    /// Predicts the positions at times (T,) in seconds, from the last observation on. A movement that is stopped goes on at
+    /// once.
     ///
     /// # Errors
     /// A time before the last observation or not finite, and as for [`Recogniser::estimate`].
@@ -61,17 +64,13 @@ impl Recogniser {
         let duration = self.estimate()?.duration;
         let factor = self.factors(duration).position;
         deviation.fill(0.0);
-        let mut row = std::mem::take(&mut self.row);
-        for h in self.active() {
-            for (k, (square, expected)) in deviation.iter_mut().zip(&*position).enumerate() {
-                let (mean, residual) = self.ahead(h, time[k / n_dofs], k % n_dofs, &mut row);
-                let along = self.beliefs[h].variance(&mut row[..self.table.n_directions]);
-                *square += self.beliefs[h].weight * ((mean - expected).powi(2) + along + residual);
-            }
-        }
-        self.row = row;
         let sum = self.sum_of_weights();
-        deviation.iter_mut().for_each(|square| *square = factor * (*square / sum).sqrt());
+        self.ahead(time, |belief, k, mean, residual, row| {
+            let error = mean - F64x4::splat(position[k]);
+            let variance = error * error + square::<F64x4>(&belief.covariance, row) + F64x4::splat(residual);
+            deviation[k] += (belief.weight * variance).reduce_add() / sum;
+        });
+        deviation.iter_mut().for_each(|square| *square = factor * square.sqrt());
         Ok(())
     }
 
@@ -99,35 +98,41 @@ impl Recogniser {
             check_range("time", t, t >= last, "must not be before the last observation")?;
         }
         position.fill(0.0);
-        let mut row = std::mem::take(&mut self.row);
         let sum = self.sum_of_weights();
-        for h in self.active() {
-            for (k, mean) in position.iter_mut().enumerate() {
-                *mean += self.beliefs[h].weight / sum * self.ahead(h, time[k / n_dofs], k % n_dofs, &mut row).0;
-            }
-        }
-        self.row = row;
+        self.ahead(time, |belief, k, mean, _, _| position[k] += (belief.weight * mean).reduce_add() / sum);
         Ok(())
     }
 
-    /// Returns the mean position of a DoF under a hypothesis and the variance of the residual; `row` becomes that of the
-    /// table.
-    fn ahead(&self, h: usize, time: f64, dof: usize, row: &mut [f64]) -> (f64, f64) {
-        let [first, last] = self.times.unwrap_or_default();
-        let (q, mean) = (self.table.n_directions, &self.beliefs[h].mean);
-        self.table.row(self.hypotheses[h].fraction(time - first), dof, row);
-        let process = &self.processes[(h * self.prior.residual().len() + dof) * self.table.width..][..=q];
-        let along = |values: &[f64]| values.iter().zip(mean).map(|(a, b)| a * b).sum::<f64>();
-        let (decay, variance) = self.noise.ahead(time - last, dof);
-        (row[q] + along(row) + decay * (process[q] - along(process)), variance)
-    }
-
-    /// Returns the hypotheses whose weights count.
-    fn active(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.beliefs.len()).filter(|&h| self.beliefs[h].weight > MIN_WEIGHT)
+    /// Calls a function for four hypotheses after four and every element of (T, D), with the mean positions, the variance of
+    /// the residual, and the row (q,) of the table.
+    fn ahead(&mut self, time: &[f64], mut predicted: impl FnMut(&Belief, usize, F64x4, f64, &[F64x4])) {
+        let [_, last] = self.times.unwrap_or_default();
+        let (q, width) = (self.table.n_directions, self.table.width);
+        let Self { table, noise, rows, clock, .. } = self;
+        let row = &mut rows[..width];
+        for ((belief, sums), four) in self.beliefs.iter().zip(&self.sums).zip(&self.fours) {
+            if !belief.counts() {
+                continue;
+            }
+            let along = |values: &[F64x4]| {
+                values.iter().zip(&belief.mean).fold(F64x4::ZERO, |sum, (value, mean)| sum + *value * *mean)
+            };
+            let mut k = 0;
+            for t in time {
+                let places = table.places(four.fraction(*clock + (t - last)));
+                for (d, process) in sums.processes.chunks_exact(width).enumerate() {
+                    table.rows::<F64x4>(&places, d, row);
+                    let (decay, variance) = noise.ahead(t - last, d);
+                    let residual = process[q] - along(process);
+                    let mean = row[q] + along(row) + residual * F64x4::splat(decay);
+                    predicted(belief, k, mean, variance, &row[..q]);
+                    k += 1;
+                }
+            }
+        }
     }
 
     fn sum_of_weights(&self) -> f64 {
-        self.active().map(|h| self.beliefs[h].weight).sum()
+        self.beliefs.iter().filter(|belief| belief.counts()).map(|belief| belief.weight.reduce_add()).sum()
     }
 }

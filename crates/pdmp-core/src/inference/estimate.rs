@@ -4,11 +4,10 @@ use std::f64::consts::TAU;
 
 use super::prior::Prior;
 use super::recogniser::Recogniser;
+use super::triangle::row;
 use crate::kind::Kind;
 use crate::model::Conditions;
-
-/// Hypotheses of less weight do not count.
-pub(crate) const MIN_WEIGHT: f64 = 1e-4;
+use crate::numerics::simd::{F64x4, WIDTH};
 
 /// Means and standard deviations of the parameters of a movement, given a part of it.
 ///
@@ -32,6 +31,9 @@ pub struct Estimate {
     pub fraction: f64,
     /// Standard deviation of `fraction`.
     pub fraction_deviation: f64,
+    /// Probability that the movement is stopped. From 0.9 on, its clock rests until it is below 0.5: fraction and positions
+    /// to come are those of a movement that goes on at once, and the arrival is later by the pause.
+    pub stopped: f64,
     /// Mean squared residual, relative to the one that a tenth of the demonstrations exceed: above 1, the movement is
     /// unlike the demonstrations.
     pub surprise: f64,
@@ -50,6 +52,7 @@ impl Estimate {
             arrival: 0.0,
             fraction: 0.0,
             fraction_deviation: 0.0,
+            stopped: 0.0,
             surprise: 0.0,
         }
     }
@@ -93,42 +96,44 @@ impl Estimate {
 }
 
 impl Recogniser {
-    /// Computes the estimate from the weighed hypotheses.
+    /// Computes the estimate from the weighed hypotheses and the sum of their second moments.
     pub(crate) fn summarise(&mut self) {
-        let [first, last] = self.times.unwrap_or_default();
+        let [_, last] = self.times.unwrap_or_default();
+        let clock = self.clock;
         let (mut log, mut log_square, mut arrival) = (0.0, 0.0, 0.0);
         let (mut fraction, mut fraction_square, mut turn) = (0.0, 0.0, [0.0; 2]);
         let Self { beliefs, hypotheses, estimate, table, scratch, .. } = self;
-        estimate.parameters.fill(0.0);
-        estimate.deviations.fill(0.0);
-        for (belief, hypothesis) in beliefs.iter().zip(&*hypotheses) {
-            let weight = belief.weight;
-            let ln = hypothesis.duration.ln();
-            log += weight * ln;
-            log_square += weight * ln * ln;
+        let rhythmic = estimate.kind == Kind::Rhythmic;
+        let weights = beliefs.iter().flat_map(|belief| belief.weight.to_array());
+        for (weight, hypothesis) in weights.zip(&*hypotheses) {
+            log += weight * hypothesis.log;
+            log_square += weight * hypothesis.log * hypothesis.log;
             arrival += weight * (1.0 + hypothesis.start) * hypothesis.duration;
-            let own = hypothesis.fraction(last - first);
+            let own = hypothesis.fraction(clock);
             fraction += weight * own;
             fraction_square += weight * own * own;
-            turn[0] += weight * (TAU * own).cos();
-            turn[1] += weight * (TAU * own).sin();
-            if weight < MIN_WEIGHT {
-                continue;
-            }
-            for (k, value) in table.parameters(&belief.mean).enumerate() {
-                scratch.row.iter_mut().zip(table.directions.row(k)).for_each(|(to, from)| *to = *from);
-                let square = value * value + belief.variance(&mut scratch.row);
-                estimate.parameters[k] += weight * value;
-                estimate.deviations[k] += weight * square;
+            if rhythmic {
+                let (sin, cos) = (TAU * own).sin_cos();
+                turn = [turn[0] + weight * cos, turn[1] + weight * sin];
             }
         }
-        estimate.duration = log.exp();
-        estimate.arrival = first + arrival;
-        let (factors, resolution) = (self.factors(log.exp()), self.log_resolution());
+        let (mean, covariance) = scratch.moments(beliefs);
+        for (k, directions) in table.directions.rows().into_iter().enumerate() {
+            let directions = directions.as_slice().unwrap_or_default();
+            estimate.parameters[k] = table.mean[k] + dot(directions, mean);
+            let mut square = 0.0;
+            for (i, own) in directions.iter().enumerate() {
+                let entries = &covariance[row(i)..=row(i) + i];
+                square += own * (2.0 * dot(entries, &directions[..i]) + entries[i] * own);
+            }
+            estimate.deviations[k] = square.max(0.0).sqrt();
+        }
+        // The duration of the first hypothesis gives the mean of the demonstrations.
+        let duration = (log - hypotheses[0].log).exp() * hypotheses[0].duration;
+        estimate.duration = duration;
+        estimate.arrival = last - clock + arrival;
+        let (factors, resolution) = (self.factors(duration), self.log_resolution());
         let estimate = &mut self.estimate;
-        for (deviation, mean) in estimate.deviations.iter_mut().zip(&estimate.parameters) {
-            *deviation = (*deviation - mean * mean).max(0.0).sqrt();
-        }
         // A goal that is reached is one up to the residual.
         let (n_styles, residual) = (self.prior.n_styles(), self.prior.residual());
         for (k, deviation) in estimate.deviations[n_styles..].iter_mut().enumerate() {
@@ -138,11 +143,12 @@ impl Recogniser {
         estimate.duration_deviation = factors.duration * resolution.hypot(log_deviation);
         estimate.fraction = fraction;
         estimate.fraction_deviation = (fraction_square - fraction * fraction).max(0.0).sqrt();
-        if self.prior.kind() == Kind::Rhythmic {
+        if rhythmic {
             let length = turn[0].hypot(turn[1]).clamp(f64::MIN_POSITIVE, 1.0);
             estimate.fraction = (turn[1].atan2(turn[0]) / TAU).rem_euclid(1.0);
             estimate.fraction_deviation = (-2.0 * length.ln()).sqrt() / TAU;
         }
+        self.estimate.stopped = self.pauses.as_ref().map_or(0.0, |pauses| pauses.probability);
         self.estimate.surprise = self.misfit() / factors.misfit;
     }
 
@@ -155,18 +161,22 @@ impl Recogniser {
 
     /// Returns the mean squared whitened residual under the most probable hypothesis.
     pub(crate) fn misfit(&self) -> f64 {
-        let best = (0..self.beliefs.len()).max_by(|&i, &j| self.beliefs[i].weight.total_cmp(&self.beliefs[j].weight));
-        let (best, width) = (best.unwrap_or(0), self.table.width);
-        let size = (self.table.n_directions + 1) * width;
-        let information = &self.information[best * size..][..size];
+        let weight = |h: usize| self.beliefs[h / WIDTH].weight.to_array()[h % WIDTH];
+        let best = (0..self.hypotheses.len()).max_by(|&a, &b| weight(a).total_cmp(&weight(b))).unwrap_or(0);
+        let (belief, information) = (&self.beliefs[best / WIDTH], &self.sums[best / WIDTH].information);
+        let lane = |lanes: &F64x4| lanes.as_array()[best % WIDTH];
         // The row [−x, 1] from both sides, on the lower triangle.
-        let row = |i: usize| self.beliefs[best].mean.get(i).map_or(1.0, |x| -x);
+        let entry = |i: usize| belief.mean.get(i).map_or(1.0, |x| -lane(x));
         let mut sum = 0.0;
-        for (i, sums) in information.chunks_exact(width).enumerate() {
-            for (j, entry) in sums[..=i].iter().enumerate() {
-                sum += if i == j { 1.0 } else { 2.0 } * row(i) * row(j) * entry;
+        for i in 0..=self.table.n_directions {
+            for (j, product) in information[row(i)..=row(i) + i].iter().enumerate() {
+                sum += if i == j { 1.0 } else { 2.0 } * entry(i) * entry(j) * lane(product);
             }
         }
         sum.max(0.0) / self.n_observed.max(1) as f64
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

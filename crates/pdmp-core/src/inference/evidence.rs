@@ -1,21 +1,38 @@
-//! Posterior of the mixture under each hypothesis of the time.
+//! Posterior of the mixture under four hypotheses of the time.
+// Closures of iterators stay calls, into which the instructions of larger registers are not inlined.
+#![allow(clippy::needless_range_loop)]
 
-use super::movement_table::MovementTable;
+use super::movement_table::{MAX_DIRECTIONS, MovementTable};
 use super::prior::{Moments, Prior};
+use super::triangle::{add_squares, backward, factorise, forward, gram, invert, product, row, size};
+use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, exp};
+
+/// Components at a time: their sums fill the registers.
+const N_TOGETHER: usize = 8;
+/// Logarithm below which the share of a component, relative to the largest, is zero.
+const MIN_LOG_SHARE: f64 = -40.0;
+/// Four hypotheses of smaller weights do not count.
+const MIN_WEIGHT: f64 = 1e-4;
+/// Components of a smaller share of all hypotheses do not count in covariances.
+const MIN_SHARE: f64 = 1e-7;
 
 /// Kernels of a prior in the coordinates x of a [`MovementTable`].
 #[derive(Clone, Debug)]
 pub(crate) struct Kernels {
-    /// Centres (q, M) at the mean logarithm of the duration.
+    /// Number q of coordinates.
+    n_directions: usize,
+    /// Number M of components, a multiple of four: those in excess have no share.
+    n_components: usize,
+    /// Centres x₀/c² (q, M) at the mean logarithm of the duration.
     centres: Vec<f64>,
-    /// Logarithms of the durations of the centres (M,), less the mean.
-    logs: Vec<f64>,
-    /// Change (q,) of every centre with the logarithm of the duration.
+    /// Change (q,) of every x₀/c² with the logarithm of the duration.
     slope: Vec<f64>,
+    /// Logarithms (M,) of the prior at log T, less ½|x₀|²/c²: constant, and factor of log T less its mean.
+    logs: Vec<[f64; 2]>,
+    /// Terms of every component: constant, and factor of the square.
+    common: [f64; 2],
     /// Precision 1/c² of every coordinate.
     precision: f64,
-    /// Precision of the logarithm of the duration.
-    log_precision: f64,
     /// Exponent β of the likelihood.
     tempering: f64,
 }
@@ -26,180 +43,305 @@ impl Kernels {
         let settings = prior.settings();
         let precision = settings.bandwidth.powi(-2);
         let kept = (1.0 - settings.bandwidth.powi(2)).sqrt();
-        let slope = table.inverse.dot(&ndarray::aview1(&moments.slope)).to_vec();
-        let logs: Vec<f64> = prior.log_durations().iter().map(|log| kept * (log - moments.log_mean)).collect();
+        let slope = table.inverse.dot(&ndarray::aview1(&moments.slope));
         let deviations = &prior.parameters() - &ndarray::aview1(&moments.mean);
         let x = table.inverse.dot(&deviations.t());
-        let centres = x.indexed_iter().map(|((i, m), x)| kept * x - slope[i] * logs[m]).collect();
+        // Without a centre of its own, every component is the same.
+        let n = if kept > 0.0 { prior.n_demos() } else { 1 };
+        let n_components = n.next_multiple_of(WIDTH);
         let log_precision = precision / moments.log_deviation.powi(2);
-        Self { centres, logs, slope, precision, log_precision, tempering: settings.tempering }
+        let mut centres = vec![0.0; table.n_directions * n_components];
+        let mut logs = vec![[f64::NEG_INFINITY, 0.0]; n_components];
+        for (m, logs) in logs.iter_mut().enumerate().take(n) {
+            let own = kept * (prior.log_durations()[m] - moments.log_mean);
+            let centre = &x.column(m) * kept - &slope * own;
+            (0..table.n_directions).for_each(|i| centres[i * n_components + m] = precision * centre[i]);
+            let square = log_precision * own * own + precision * centre.dot(&centre);
+            *logs = [-0.5 * square, log_precision * own - precision * centre.dot(&slope)];
+        }
+        let constant = 0.5 * table.n_directions as f64 * precision.ln() + (prior.n_demos() as f64 / n as f64).ln();
+        let common = [constant, -0.5 * (log_precision + precision * slope.dot(&slope))];
+        let (slope, tempering) = ((slope * precision).to_vec(), settings.tempering);
+        Self { n_directions: table.n_directions, n_components, centres, slope, logs, common, precision, tempering }
     }
 }
 
-/// Posterior of one hypothesis: a mixture of Gaussians of the covariance (FFᵀ)⁻¹ with the lower triangle F.
+/// Posterior of four hypotheses: mixtures of Gaussians of the covariance (FFᵀ)⁻¹ with the lower triangle F.
 #[derive(Clone, Debug)]
 pub(crate) struct Belief {
-    /// Logarithm of the evidence, then the weight of the hypothesis.
-    pub(crate) weight: f64,
-    /// Mean (q,).
-    pub(crate) mean: Vec<f64>,
-    /// Factor F (q, q) by rows.
-    factor: Vec<f64>,
-    /// Covariance (q, q) of the vectors z = Fᵀx over the means x of the components.
-    spread: Vec<f64>,
+    /// Logarithm of the evidence, then the weights of the hypotheses.
+    pub(crate) weight: F64x4,
+    /// Vector βΣΦᵀy + x₀/c² (q,) without the centres, then the mean.
+    pub(crate) mean: Vec<F64x4>,
+    /// Covariance (q, q) of the mixture.
+    pub(crate) covariance: Vec<F64x4>,
+    /// Factor F (q, q).
+    factor: Vec<F64x4>,
+    /// Logarithms of the shares of the components (M,), then the shares.
+    shares: Vec<F64x4>,
+    /// Mean of the centres x₀/c² (q,).
+    centre: Vec<F64x4>,
 }
 
-/// Memory of [`Belief::update`].
+impl Belief {
+    pub(crate) fn new(kernels: &Kernels) -> Self {
+        let (q, m) = (kernels.n_directions, kernels.n_components);
+        let lanes = |n: usize| vec![F64x4::ZERO; n];
+        Self {
+            weight: F64x4::ZERO,
+            mean: lanes(q),
+            covariance: lanes(size(q)),
+            factor: lanes(size(q)),
+            shares: lanes(m),
+            centre: lanes(q),
+        }
+    }
+
+    /// Returns whether the weight of one of the hypotheses counts.
+    pub(crate) fn counts(&self) -> bool {
+        self.weight.to_array().iter().any(|weight| *weight > MIN_WEIGHT)
+    }
+}
+
+/// Kernel that computes evidence and shares.
+///
+/// `information` (q + 1, q + 1) is the sum of the outer products of the whitened rows [Φ, y]; `log` the logarithm of the
+/// duration, less the mean. With Λ = I/c² + βΣΦᵀΦ = FFᵀ and b = x₀/c² + βΣΦᵀy of a component with centre x₀, its mean is
+/// Λ⁻¹b and its evidence exp(½|F⁻¹b|² − ½|x₀|²/c² − ½βΣy²) / √|c²Λ|.
+pub(crate) struct Weigh<'a> {
+    pub(crate) belief: &'a mut Belief,
+    pub(crate) information: &'a [F64x4],
+    pub(crate) log: F64x4,
+    pub(crate) kernels: &'a Kernels,
+}
+
+impl Kernel for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { belief: Belief { weight, mean, factor, shares, .. }, information, log, kernels } = self;
+        let (q, beta, own) = (kernels.n_directions, kernels.tempering, T::load(&log));
+        for i in 0..q {
+            let (to, from) = (&mut factor[row(i)..][..i + 1], &information[row(i)..][..i + 1]);
+            for j in 0..=i {
+                to[j] = (T::load(&from[j]) * beta).store();
+            }
+            factor[row(i) + i] += F64x4::splat(kernels.precision);
+        }
+        let determinant = factorise::<T>(factor, q);
+        let observed = &information[row(q)..=row(q) + q];
+        for i in 0..q {
+            mean[i] = (T::load(&observed[i]) * beta + own * kernels.slope[i]).store();
+        }
+        let (eights, rest) = shares.as_chunks_mut::<N_TOGETHER>();
+        let mut memory = [[T::default(); N_TOGETHER]; MAX_DIRECTIONS];
+        for k in 0..eights.len() {
+            components(kernels, N_TOGETHER * k, own, mean, factor, &mut memory[..q], &mut eights[k]);
+        }
+        if let Some(four) = rest.first_chunk_mut::<WIDTH>() {
+            let mut memory = [[T::default(); WIDTH]; MAX_DIRECTIONS];
+            let first = kernels.n_components - WIDTH;
+            components(kernels, first, own, mean, factor, &mut memory[..q], four);
+        }
+        let (mut largest, mut sum) = (T::splat(f64::NEG_INFINITY), T::default());
+        for m in 0..shares.len() {
+            largest = largest.fast_max(T::load(&shares[m]));
+        }
+        for m in 0..shares.len() {
+            let relative = T::load(&shares[m]) - largest;
+            let counts = !relative.simd_lt(T::splat(MIN_LOG_SHARE)).all();
+            // The exponential of the limit itself is below the rounding errors of a sum.
+            let share = exp(relative.fast_max(T::splat(MIN_LOG_SHARE)));
+            shares[m] = if counts { share.store() } else { F64x4::ZERO };
+            sum = sum + T::load(&shares[m]);
+        }
+        let scale = T::splat(1.0) / sum;
+        for m in 0..shares.len() {
+            shares[m] = (T::load(&shares[m]) * scale).store();
+        }
+        let [constant, of_square] = kernels.common;
+        let common = observed[q] * F64x4::splat(-0.5 * beta) + log * log * F64x4::splat(of_square) - determinant;
+        *weight += common + F64x4::splat(constant) + largest.store() + sum.store().ln();
+    }
+}
+
+/// Computes the logarithms of the shares of N components from the first one on.
+#[inline(always)]
+fn components<T: Register, const N: usize>(
+    kernels: &Kernels,
+    first: usize,
+    log: T,
+    observed: &[F64x4],
+    factor: &[F64x4],
+    memory: &mut [[T; N]],
+    shares: &mut [F64x4; N],
+) {
+    for i in 0..memory.len() {
+        let observed = T::load(&observed[i]);
+        let centres = &kernels.centres[i * kernels.n_components + first..][..N];
+        for k in 0..N {
+            memory[i][k] = observed + T::splat(centres[k]);
+        }
+    }
+    forward(factor, memory);
+    let mut squares = [T::default(); N];
+    for i in 0..memory.len() {
+        for k in 0..N {
+            squares[k] = squares[k] + memory[i][k] * memory[i][k];
+        }
+    }
+    let logs = &kernels.logs[first..][..N];
+    for k in 0..N {
+        let [constant, of_log] = logs[k];
+        shares[k] = (squares[k] * 0.5 + (log * of_log + T::splat(constant))).store();
+    }
+}
+
+/// Kernel that computes means after [`Weigh`].
+pub(crate) struct Mean<'a> {
+    pub(crate) belief: &'a mut Belief,
+    pub(crate) kernels: &'a Kernels,
+}
+
+impl Kernel for Mean<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { belief: Belief { mean, factor, shares, centre, .. }, kernels } = self;
+        let mut memory = [[T::default(); 1]; MAX_DIRECTIONS];
+        let vector = &mut memory[..mean.len()];
+        let shares = shares.as_chunks::<WIDTH>().0;
+        for i in 0..vector.len() {
+            let centres = &kernels.centres[i * kernels.n_components..].as_chunks::<WIDTH>().0[..shares.len()];
+            let mut sums = [T::default(); WIDTH];
+            for m in 0..shares.len() {
+                for k in 0..WIDTH {
+                    sums[k] = sums[k] + T::load(&shares[m][k]) * centres[m][k];
+                }
+            }
+            let sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+            centre[i] = sum.store();
+            vector[i][0] = T::load(&mean[i]) + sum;
+        }
+        forward(factor, vector);
+        backward(factor, vector);
+        for i in 0..vector.len() {
+            mean[i] = vector[i][0].store();
+        }
+    }
+}
+
+/// Memory of [`Spread`].
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Vectors z = Fᵀx (q, M) of the means x of the components: loops over components run in vector registers.
-    means: Vec<f64>,
-    /// Logarithms of the weights (M,) of the components, then the weights.
-    weights: Vec<f64>,
-    /// Memory (q,) of a row.
-    pub(crate) row: Vec<f64>,
+    /// Triangular matrix (q, q).
+    root: Vec<F64x4>,
+    /// Symmetric matrix Λ⁻¹ (q, q).
+    inverse: Vec<F64x4>,
+    /// Vectors (q,) of components, padded to a multiple of four.
+    vectors: Vec<F64x4>,
+    /// Components that count.
+    chosen: Vec<usize>,
+    /// Sum of the second moments (q, q) of the hypotheses by their weights.
+    second: Vec<F64x4>,
+    /// Mean (q,) and covariance (q, q) over all hypotheses.
+    mean: Vec<f64>,
+    covariance: Vec<f64>,
 }
 
 impl Scratch {
     pub(crate) fn new(kernels: &Kernels) -> Self {
-        let (m, q) = (kernels.logs.len(), kernels.slope.len());
-        Self { means: vec![0.0; m * q], weights: vec![0.0; m], row: vec![0.0; q] }
+        let q = kernels.n_directions;
+        let lanes = |n: usize| vec![F64x4::ZERO; n];
+        Self {
+            root: lanes(size(q)),
+            inverse: lanes(size(q)),
+            vectors: lanes(N_TOGETHER * q.next_multiple_of(WIDTH)),
+            chosen: Vec::with_capacity(kernels.n_components),
+            second: lanes(size(q)),
+            mean: vec![0.0; q],
+            covariance: vec![0.0; size(q)],
+        }
+    }
+
+    /// Begins a sum of second moments.
+    pub(crate) fn begin(&mut self) {
+        self.second.fill(F64x4::ZERO);
+    }
+
+    /// Returns mean (q,) and covariance (q, q), its lower triangle, over the hypotheses that count.
+    pub(crate) fn moments(&mut self, beliefs: &[Belief]) -> (&[f64], &[f64]) {
+        let Self { second, mean, covariance, .. } = self;
+        let counting = beliefs.iter().filter(|belief| belief.counts());
+        let scale = counting.clone().map(|belief| belief.weight.reduce_add()).sum::<f64>().recip();
+        for (i, entry) in mean.iter_mut().enumerate() {
+            *entry = scale * counting.clone().map(|belief| (belief.weight * belief.mean[i]).reduce_add()).sum::<f64>();
+        }
+        for i in 0..mean.len() {
+            let entries = row(i)..=row(i) + i;
+            for ((entry, second), other) in covariance[entries.clone()].iter_mut().zip(&second[entries]).zip(&*mean) {
+                *entry = scale * second.reduce_add() - mean[i] * other;
+            }
+        }
+        (mean, covariance)
     }
 }
 
-impl Belief {
-    pub(crate) fn new(q: usize) -> Self {
-        let square = || vec![0.0; q * q];
-        Self { weight: 0.0, mean: vec![0.0; q], factor: square(), spread: square() }
-    }
+/// Kernel that computes covariances after [`Mean`], and adds the second moments to those of the other hypotheses.
+pub(crate) struct Spread<'a> {
+    pub(crate) belief: &'a mut Belief,
+    pub(crate) kernels: &'a Kernels,
+    pub(crate) scratch: &'a mut Scratch,
+}
 
-    /// Computes mean and evidence.
-    ///
-    /// `information` (q + 1, w) is the sum of the outer products of the whitened rows [Φ, y], its lower triangle;
-    /// `log` the logarithm of the duration, less the mean. With Λ = I/c² + βΣΦᵀΦ = FFᵀ and b = x₀/c² + βΣΦᵀy of a component
-    /// with centre x₀, its mean is Λ⁻¹b and its evidence exp(½|F⁻¹b|² − ½|x₀|²/c² − ½βΣy²) / √|c²Λ|.
-    pub(crate) fn update(&mut self, information: &[f64], log: f64, kernels: &Kernels, scratch: &mut Scratch) {
-        let (q, beta) = (self.mean.len(), kernels.tempering);
-        let width = information.len() / (q + 1);
+impl Kernel for Spread<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { belief, kernels, scratch: Scratch { root, inverse, vectors, chosen, second, .. } } = self;
+        let Belief { weight, mean, covariance, factor, shares, centre } = belief;
+        let (q, weight) = (mean.len(), T::load(weight));
+        let width = q.next_multiple_of(WIDTH);
+        invert::<T>(factor, root, q);
+        gram::<T>(root, inverse, q);
+        covariance.copy_from_slice(inverse);
+        chosen.clear();
+        for m in 0..shares.len() {
+            if !(T::load(&shares[m]) * weight).simd_lt(T::splat(MIN_SHARE)).all() {
+                chosen.push(m);
+            }
+        }
+        // A single component has no other mean.
+        if chosen.len() == 1 {
+            chosen.clear();
+        }
+        let mut deviations = [[T::default(); N_TOGETHER]; MAX_DIRECTIONS];
+        for chosen in chosen.chunks(N_TOGETHER) {
+            for k in 0..chosen.len() {
+                let scale = T::load(&shares[chosen[k]]).sqrt();
+                for i in 0..q {
+                    let own = T::splat(kernels.centres[i * kernels.n_components + chosen[k]]);
+                    deviations[i][k] = (own - T::load(&centre[i])) * scale;
+                }
+            }
+            for i in 0..q {
+                let moved = product(inverse, &deviations[..q], i);
+                for k in 0..N_TOGETHER {
+                    vectors[k * width + i] = moved[k].store();
+                }
+            }
+            add_squares::<T>(covariance, &vectors[..chosen.len() * width], width, q);
+        }
         for i in 0..q {
+            let (moments, entries) = (&mut second[row(i)..][..i + 1], &covariance[row(i)..][..i + 1]);
+            let own = T::load(&mean[i]);
             for j in 0..=i {
-                self.factor[i * q + j] = beta * information[i * width + j];
-            }
-            self.factor[i * q + i] += kernels.precision;
-        }
-        factorise(&mut self.factor, q);
-        self.weight = self.components(information, log, kernels, scratch);
-        for (mean, z) in self.mean.iter_mut().zip(scratch.means.chunks_exact(scratch.weights.len())) {
-            *mean = dot(z, &scratch.weights);
-        }
-        backward(&self.factor, &mut self.mean);
-    }
-
-    /// Computes the covariance of the means of the components after [`Self::update`] with the same arguments.
-    pub(crate) fn spread(&mut self, information: &[f64], log: f64, kernels: &Kernels, scratch: &mut Scratch) {
-        self.components(information, log, kernels, scratch);
-        let Scratch { means, weights, .. } = scratch;
-        let (q, m) = (self.mean.len(), weights.len());
-        for z in means.chunks_exact_mut(m) {
-            let mean = dot(z, weights);
-            z.iter_mut().zip(&*weights).for_each(|(z, weight)| *z = (*z - mean) * weight.sqrt());
-        }
-        for i in 0..q {
-            for j in 0..=i {
-                let entry = dot(&means[i * m..(i + 1) * m], &means[j * m..(j + 1) * m]);
-                self.spread[i * q + j] = entry;
-                self.spread[j * q + i] = entry;
+                let square = T::load(&entries[j]) + own * T::load(&mean[j]);
+                moments[j] = (T::load(&moments[j]) + weight * square).store();
             }
         }
     }
-
-    /// Computes the vectors z and the weights of the components; returns the logarithm of the evidence.
-    fn components(&self, information: &[f64], log: f64, kernels: &Kernels, scratch: &mut Scratch) -> f64 {
-        let Scratch { means, weights, .. } = scratch;
-        let (q, m, beta) = (self.mean.len(), weights.len(), kernels.tempering);
-        let observed = &information[q * (information.len() / (q + 1))..];
-        let mut common = -0.5 * beta * observed[q];
-        for (weight, own) in weights.iter_mut().zip(&kernels.logs) {
-            *weight = -0.5 * kernels.log_precision * (log - own).powi(2);
-        }
-        for i in 0..q {
-            let (solved, rest) = means.split_at_mut(i * m);
-            let z = &mut rest[..m];
-            let (shift, data) = (kernels.slope[i] * log, beta * observed[i]);
-            for ((z, weight), centre) in z.iter_mut().zip(&mut *weights).zip(&kernels.centres[i * m..]) {
-                let centre = centre + shift;
-                *weight -= 0.5 * kernels.precision * centre * centre;
-                *z = data + kernels.precision * centre;
-            }
-            let row = &self.factor[i * q..=i * q + i];
-            for (entry, other) in row.iter().zip(solved.chunks_exact(m)) {
-                z.iter_mut().zip(other).for_each(|(z, other)| *z -= entry * other);
-            }
-            common += 0.5 * kernels.precision.ln() - row[i].ln();
-            let inverse = row[i].recip();
-            for (z, weight) in z.iter_mut().zip(&mut *weights) {
-                *z *= inverse;
-                *weight += 0.5 * *z * *z;
-            }
-        }
-        common + normalise(weights)
-    }
-
-    /// Returns the variance of aᵀx for a row a (q,), which is overwritten.
-    pub(crate) fn variance(&self, row: &mut [f64]) -> f64 {
-        forward(&self.factor, row);
-        let own: f64 = row.iter().map(|a| a * a).sum();
-        let spread = self.spread.chunks_exact(row.len()).zip(&*row).map(|(entries, a)| a * dot(entries, row));
-        own + spread.sum::<f64>()
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Replaces a positive definite matrix (q, q), its lower triangle, by its Cholesky factor.
-fn factorise(matrix: &mut [f64], q: usize) {
-    for i in 0..q {
-        let (above, rest) = matrix.split_at_mut(i * q);
-        let row = &mut rest[..=i];
-        for j in 0..i {
-            let other = &above[j * q..=j * q + j];
-            row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
-        }
-        // Rounding alone could make it negative: the prior precision is part of it.
-        row[i] = (row[i] - dot(&row[..i], &row[..i])).max(f64::MIN_POSITIVE).sqrt();
-    }
-}
-
-/// Solves F z = b in place.
-fn forward(factor: &[f64], b: &mut [f64]) {
-    let q = b.len();
-    for i in 0..q {
-        let row = &factor[i * q..=i * q + i];
-        b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
-    }
-}
-
-/// Solves Fᵀ x = z in place.
-fn backward(factor: &[f64], z: &mut [f64]) {
-    let q = z.len();
-    for i in (0..q).rev() {
-        let row = &factor[i * q..=i * q + i];
-        z[i] /= row[i];
-        let x = z[i];
-        z[..i].iter_mut().zip(row).for_each(|(z, entry)| *z -= entry * x);
-    }
-}
-
-/// Replaces logarithms by weights that add up to one, and returns the logarithm of the sum of their exponentials.
-pub(crate) fn normalise(logs: &mut [f64]) -> f64 {
-    let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut sum = 0.0;
-    for log in logs.iter_mut() {
-        *log = (*log - largest).exp();
-        sum += *log;
-    }
-    logs.iter_mut().for_each(|weight| *weight /= sum);
-    largest + sum.ln()
 }

@@ -14,9 +14,12 @@ mod file;
 mod linear_path;
 mod movement_table;
 mod noise_filter;
+mod observation;
 mod passage;
+mod pauses;
 pub(crate) mod prior;
 pub(crate) mod recogniser;
+mod triangle;
 mod via_points;
 
 pub(crate) use calibration::SHARES;

@@ -1,4 +1,6 @@
 //! Table of the movements of independent parameters.
+// Closures of iterators stay calls, into which the instructions of larger registers are not inlined.
+#![allow(clippy::needless_range_loop)]
 
 use std::sync::Arc;
 
@@ -10,13 +12,21 @@ use crate::kind::Kind;
 use crate::model::primitive::Primitive;
 use crate::motion::unit_responses::unit_curves;
 use crate::numerics::linear_algebra::symmetric_eigen;
+use crate::numerics::simd::{F64x4, Register, WIDTH, padded};
 
 /// Intervals of the table over the movement; linear interpolation errs by less than 1e-4 of the range.
 const STEPS: usize = 200;
 /// Largest number of directions of the parameters: it bounds the time of a sample.
-const MAX_DIRECTIONS: usize = 24;
+pub(crate) const MAX_DIRECTIONS: usize = 24;
 /// Smallest mean square of the movement along a direction, relative to the variance of the residual.
 const MIN_VARIANCE: f64 = 1e-2;
+
+/// Place between two samples of the table.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    index: usize,
+    weight: f64,
+}
 
 /// Movements y(u) = Φ(u)θ, tabulated for θ = μ + k·(log T − mean of log T) + L·x with independent x of unit variance.
 ///
@@ -25,13 +35,13 @@ const MIN_VARIANCE: f64 = 1e-2;
 #[derive(Clone, Debug)]
 pub(crate) struct MovementTable {
     kind: Kind,
-    n_dofs: usize,
+    pub(crate) n_dofs: usize,
     /// Number q of directions.
     pub(crate) n_directions: usize,
     /// Length w of a row: q + 1 and zeros up to a multiple of four, so that loops run in vector registers.
     pub(crate) width: usize,
-    /// Rows Φ_d(u)[L, μ, 0] (w,) for each sample and DoF.
-    rows: Vec<f64>,
+    /// Rows Φ_d(u)[L, μ, 0] (w,) for each sample and DoF, in groups of four columns.
+    rows: Vec<F64x4>,
     /// Mean μ (K,).
     pub(crate) mean: Vec<f64>,
     /// Matrix L (K, q).
@@ -68,39 +78,50 @@ impl MovementTable {
         let inverse = kept.t().dot(&inverse);
         let (along, mean) = (responses.dot(&directions), responses.dot(&ndarray::aview1(&moments.mean)));
         let width = (n_directions + 1).next_multiple_of(4);
-        let mut rows = vec![0.0; n_rows * width];
-        for ((row, along), mean) in rows.chunks_exact_mut(width).zip(along.rows()).zip(&mean) {
-            row.iter_mut().zip(along.iter().chain([mean])).for_each(|(to, from)| *to = *from);
+        let mut rows = Vec::with_capacity(n_rows * width / WIDTH);
+        for (along, mean) in along.rows().into_iter().zip(&mean) {
+            let row: Vec<f64> = along.iter().chain([mean]).copied().collect();
+            rows.extend(row.chunks(WIDTH).map(padded));
         }
         Ok(Self { kind, n_dofs, n_directions, width, rows, mean: moments.mean.clone(), directions, inverse })
     }
 
-    /// Returns the movements of the directions and the mean at a fraction of the duration or period, for one DoF:
+    /// Returns the movements of the directions and the mean at four fractions of the duration or period, for one DoF:
     /// Φ_d(u)[L, μ, 0] (w,). A discrete movement rests before its start and past its end.
-    pub(crate) fn row(&self, fraction: f64, dof: usize, row: &mut [f64]) {
-        let (index, weight) = self.place(fraction);
-        let stride = self.n_dofs * self.width;
-        let first = index * stride + dof * self.width;
-        let (below, above) = (&self.rows[first..], &self.rows[first + stride..]);
-        for ((entry, a), b) in row.iter_mut().zip(below).zip(above) {
-            *entry = a + weight * (b - a);
+    #[inline(always)]
+    pub(crate) fn rows<T: Register>(&self, places: &[Place; WIDTH], dof: usize, rows: &mut [F64x4]) {
+        let n = self.width / WIDTH;
+        let stride = self.n_dofs * n;
+        let blocks = &mut rows.as_chunks_mut::<WIDTH>().0[..n];
+        let mut samples = [(&self.rows[..0], &self.rows[..0]); WIDTH];
+        for l in 0..WIDTH {
+            let first = places[l].index * stride + dof * n;
+            samples[l] = (&self.rows[first..][..n], &self.rows[first + stride..][..n]);
+        }
+        for k in 0..n {
+            let mut lanes = [T::default(); WIDTH];
+            for l in 0..WIDTH {
+                let (below, above) = (T::load(&samples[l].0[k]), T::load(&samples[l].1[k]));
+                lanes[l] = below + (above - below) * places[l].weight;
+            }
+            let columns = T::transpose(lanes);
+            for l in 0..WIDTH {
+                blocks[k][l] = columns[l].store();
+            }
         }
     }
 
-    fn place(&self, fraction: f64) -> (usize, f64) {
-        let fraction = match self.kind {
-            Kind::Discrete => fraction.clamp(0.0, 1.0),
-            Kind::Rhythmic => fraction - fraction.floor(),
-        };
-        let place = fraction * STEPS as f64;
-        let index = (place as usize).min(STEPS - 1);
-        (index, place - index as f64)
-    }
-
-    /// Returns the parameters (K,) at coordinates x (q,).
-    pub(crate) fn parameters<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        let sum = move |row: ndarray::ArrayView1<f64>| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
-        self.mean.iter().zip(self.directions.rows()).map(move |(mean, row)| mean + sum(row))
+    /// Returns the places of fractions of the duration or period.
+    pub(crate) fn places(&self, fractions: [f64; WIDTH]) -> [Place; WIDTH] {
+        fractions.map(|fraction| {
+            let fraction = match self.kind {
+                Kind::Discrete => fraction.clamp(0.0, 1.0),
+                Kind::Rhythmic => fraction - fraction.floor(),
+            };
+            let place = fraction * STEPS as f64;
+            let index = (place as usize).min(STEPS - 1);
+            Place { index, weight: place - index as f64 }
+        })
     }
 }
 

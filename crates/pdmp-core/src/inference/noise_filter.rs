@@ -1,7 +1,7 @@
 //! Whitening of a residual that is correlated over time.
 
 /// Share of the variance of the residual that is white.
-const WHITE: f64 = 0.1;
+pub(crate) const WHITE: f64 = 0.1;
 
 /// Kalman filter of the residual of each DoF, the sum of an Ornstein-Uhlenbeck process and white noise.
 ///
@@ -33,6 +33,13 @@ impl NoiseFilter {
         self.uncertain.iter_mut().zip(&self.variances).for_each(|(own, variance)| *own = (1.0 - WHITE) * variance);
         self.decay = 0.0;
         self.gains.fill(None);
+    }
+
+    /// Returns to the state of another filter of the same residuals.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.decay = other.decay;
+        self.uncertain.copy_from_slice(&other.uncertain);
+        self.gains.copy_from_slice(&other.gains);
     }
 
     /// Advances by an interval in seconds to an observation, of which missing DoFs are NaN.

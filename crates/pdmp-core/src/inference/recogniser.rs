@@ -1,14 +1,17 @@
 //! Recognition of a movement while it is observed.
 
 use super::calibration::BandFactors;
-use super::estimate::{Estimate, MIN_WEIGHT};
-use super::evidence::{Belief, Kernels, Scratch};
+use super::estimate::Estimate;
+use super::evidence::{Belief, Kernels, Mean, Scratch, Spread, Weigh};
 use super::movement_table::MovementTable;
 use super::noise_filter::NoiseFilter;
+use super::observation::{Hypotheses, Observe, Sums};
+use super::pauses::Pauses;
 use super::prior::{Moments, Prior};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::Model;
+use crate::numerics::simd::{F64x4, WIDTH, compute};
 use crate::validate::{check_length, check_number, check_range};
 
 /// Hypotheses of the duration, where the start is known.
@@ -74,6 +77,9 @@ impl Hypothesis {
 /// sums of outer products of whitened observations: the movement is linear in θ. An observation takes the same time and
 /// memory at any time, and does not allocate.
 ///
+/// The movement may pause. The clock of all hypotheses rests while it does, and what is observed then is no part of the
+/// sums ([`Estimate::stopped`]).
+///
 /// ```
 /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit, rollout};
 /// # use pdmp_core::inference::{Recogniser, Timing};
@@ -106,16 +112,19 @@ pub struct Recogniser {
     pub(crate) table: MovementTable,
     kernels: Kernels,
     pub(crate) hypotheses: Vec<Hypothesis>,
+    /// The hypotheses in fours; the last ones in excess have no weight.
+    pub(crate) fours: Vec<Hypotheses>,
     pub(crate) noise: NoiseFilter,
-    /// Estimate of the process of the residual for each hypothesis and DoF, linear in [x, 1] (w,).
-    pub(crate) processes: Vec<f64>,
-    /// Sum of the outer products of whitened rows of each hypothesis (q + 1, w), its lower triangle.
-    pub(crate) information: Vec<f64>,
+    pub(crate) sums: Vec<Sums>,
     pub(crate) beliefs: Vec<Belief>,
     pub(crate) scratch: Scratch,
-    pub(crate) row: Vec<f64>,
+    pub(crate) rows: Vec<F64x4>,
     /// Times of the first and the last observation, in seconds.
     pub(crate) times: Option<[f64; 2]>,
+    /// Time from the first to the last observation without pauses, in seconds.
+    pub(crate) clock: f64,
+    /// Filter of pauses, if there may be any.
+    pub(crate) pauses: Option<Pauses>,
     /// Number of observed positions.
     pub(crate) n_observed: usize,
     stage: Stage,
@@ -128,10 +137,13 @@ impl Recogniser {
     /// # Errors
     /// A prior of another model, a model with rotations or a time warp, or times that are not finite.
     pub fn new(model: &Model, prior: &Prior, timing: Timing) -> Result<Self> {
-        Self::with_durations(model, prior, timing, N_DURATIONS)
+        let mut recogniser = Self::with_durations(model, prior, timing, N_DURATIONS)?;
+        recogniser.pauses =
+            Some(Pauses::new(prior, &recogniser.noise, &recogniser.sums, recogniser.table.n_directions));
+        Ok(recogniser)
     }
 
-    /// Creates a recogniser as [`Self::new`] does, with a number of hypotheses of the duration.
+    /// Creates a recogniser of movements without pauses, with a number of hypotheses of the duration.
     pub(crate) fn with_durations(model: &Model, prior: &Prior, timing: Timing, n_durations: usize) -> Result<Self> {
         prior.check_model(model)?;
         check_linear(model)?;
@@ -139,15 +151,16 @@ impl Recogniser {
         let table = MovementTable::new(model.primitive(), prior, &moments)?;
         let kernels = Kernels::new(prior, &moments, &table);
         let hypotheses = hypotheses(prior, timing, &moments, n_durations)?;
-        let (n, q, width) = (hypotheses.len(), table.n_directions, table.width);
+        let fours: Vec<Hypotheses> = hypotheses.chunks(WIDTH).map(four).collect();
         Ok(Self {
             noise: NoiseFilter::new(prior.residual(), prior.settings().correlation_time),
-            processes: vec![0.0; n * model.n_dofs() * width],
-            information: vec![0.0; n * (q + 1) * width],
-            beliefs: vec![Belief::new(q); n],
+            sums: vec![Sums::new(&table); fours.len()],
+            beliefs: vec![Belief::new(&kernels); fours.len()],
             scratch: Scratch::new(&kernels),
-            row: vec![0.0; width],
+            rows: vec![F64x4::ZERO; model.n_dofs().max(2) * table.width],
             times: None,
+            clock: 0.0,
+            pauses: None,
             n_observed: 0,
             stage: Stage::Observed,
             estimate: Estimate::new(prior),
@@ -155,15 +168,16 @@ impl Recogniser {
             table,
             kernels,
             hypotheses,
+            fours,
         })
     }
 
     /// Forgets all observations. Does not allocate.
     pub fn reset(&mut self) {
-        let Self { processes, information, .. } = self;
-        processes.iter_mut().chain(information).for_each(|value| *value = 0.0);
+        self.sums.iter_mut().for_each(Sums::reset);
         self.noise.restart();
-        (self.times, self.n_observed, self.stage) = (None, 0, Stage::Observed);
+        self.pauses.iter_mut().for_each(Pauses::reset);
+        (self.times, self.clock, self.n_observed, self.stage) = (None, 0.0, 0, Stage::Observed);
     }
 
     /// Returns the number of hypotheses.
@@ -179,8 +193,8 @@ impl Recogniser {
     /// remains as it was.
     pub fn update(&mut self, time: f64, position: &[f64]) -> Result<()> {
         check_length("position", position.len(), self.prior.residual().len(), "DoF")?;
-        let observed = position.iter().enumerate().filter(|(_, y)| !y.is_nan());
-        observed.clone().try_for_each(|(d, &y)| check_number("position", d, y))?;
+        let mut observed = position.iter().enumerate().filter(|(_, y)| !y.is_nan());
+        observed.try_for_each(|(d, &y)| check_number("position", d, y))?;
         check_number("time", 0, time)?;
         let (first, interval) = match self.times {
             None => (time, 0.0),
@@ -194,36 +208,25 @@ impl Recogniser {
                 (first, time - last)
             }
         };
-        self.n_observed += observed.count();
         self.times = Some([first, time]);
         self.stage = Stage::Observed;
-        self.noise.advance(interval, position);
-        let (q, width) = (self.table.n_directions, self.table.width);
-        let processes = self.processes.chunks_exact_mut(position.len() * width);
-        let information = self.information.chunks_exact_mut((q + 1) * width);
-        for ((hypothesis, processes), information) in self.hypotheses.iter().zip(processes).zip(information) {
-            let fraction = hypothesis.fraction(time - first);
-            for (d, process) in processes.chunks_exact_mut(width).enumerate() {
-                process.iter_mut().for_each(|value| *value *= self.noise.decay);
-                let Some((gain, scale)) = self.noise.gains[d] else { continue };
-                let row = &mut self.row[..width];
-                self.table.row(fraction, d, row);
-                row[q] = position[d] - row[q];
-                for (value, process) in row.iter_mut().zip(process) {
-                    let innovation = *value - *process;
-                    *process += gain * innovation;
-                    *value = scale * innovation;
-                }
-                for (i, sums) in information.chunks_exact_mut(width).enumerate() {
-                    let (sums, row, factor) = (sums.as_chunks_mut::<4>().0, row.as_chunks::<4>().0, row[i]);
-                    // The lower triangle, in whole registers.
-                    for (sums, values) in sums.iter_mut().zip(row).take(i / 4 + 1) {
-                        (0..4).for_each(|k| sums[k] += factor * values[k]);
-                    }
-                }
-            }
+        if self.pauses.as_ref().is_none_or(|pauses| !pauses.stopped) {
+            self.include(interval, position);
         }
+        self.watch(time, position);
         Ok(())
+    }
+
+    /// Includes positions (D,) after an interval in seconds of the clock.
+    pub(crate) fn include(&mut self, interval: f64, position: &[f64]) {
+        self.clock += interval;
+        self.n_observed += position.iter().filter(|y| !y.is_nan()).count();
+        self.noise.advance(interval, position);
+        let Self { table, noise, rows, .. } = self;
+        for (four, sums) in self.fours.iter().zip(&mut self.sums) {
+            let places = table.places(four.fraction(self.clock));
+            compute(Observe { sums, table, places, noise, position, rows });
+        }
     }
 
     /// Returns the estimate from all observations so far. Does not allocate.
@@ -233,12 +236,10 @@ impl Recogniser {
     pub fn estimate(&mut self) -> Result<&Estimate> {
         if self.stage < Stage::Estimated {
             self.weigh()?;
-            let size = (self.table.n_directions + 1) * self.table.width;
-            let information = self.information.chunks_exact(size);
-            for ((belief, information), hypothesis) in self.beliefs.iter_mut().zip(information).zip(&self.hypotheses) {
-                if belief.weight > MIN_WEIGHT {
-                    belief.spread(information, hypothesis.log, &self.kernels, &mut self.scratch);
-                }
+            let Self { kernels, scratch, .. } = self;
+            scratch.begin();
+            for belief in self.beliefs.iter_mut().filter(|belief| belief.counts()) {
+                compute(Spread { belief, kernels, scratch });
             }
             self.summarise();
             self.stage = Stage::Estimated;
@@ -258,19 +259,28 @@ impl Recogniser {
             let problem = "has none: call update with a position first";
             return Err(Error::Argument { name: "observations", problem });
         }
-        let size = (self.table.n_directions + 1) * self.table.width;
-        let information = self.information.chunks_exact(size);
-        for ((belief, information), hypothesis) in self.beliefs.iter_mut().zip(information).zip(&self.hypotheses) {
-            belief.update(information, hypothesis.log, &self.kernels, &mut self.scratch);
+        let Self { kernels, .. } = self;
+        for ((belief, sums), four) in self.beliefs.iter_mut().zip(&self.sums).zip(&self.fours) {
+            belief.weight = four.weight;
+            compute(Weigh { belief, information: &sums.information, log: four.log, kernels });
         }
-        let largest = self.beliefs.iter().map(|belief| belief.weight).fold(f64::NEG_INFINITY, f64::max);
-        if !largest.is_finite() || self.beliefs.iter().any(|belief| belief.weight.is_nan()) {
+        let weights = || self.beliefs.iter().flat_map(|belief| belief.weight.to_array());
+        let largest = weights().fold(f64::NEG_INFINITY, f64::max);
+        if !largest.is_finite() || weights().any(f64::is_nan) {
             let problem = "are too far from the demonstrations: check their units";
             return Err(Error::Argument { name: "observations", problem });
         }
-        self.beliefs.iter_mut().for_each(|belief| belief.weight = (belief.weight - largest).exp());
-        let sum: f64 = self.beliefs.iter().map(|belief| belief.weight).sum();
-        self.beliefs.iter_mut().for_each(|belief| belief.weight /= sum);
+        let mut sum = 0.0;
+        for belief in &mut self.beliefs {
+            belief.weight = (belief.weight - F64x4::splat(largest)).exp();
+            sum += belief.weight.reduce_add();
+        }
+        for belief in &mut self.beliefs {
+            belief.weight *= F64x4::splat(sum.recip());
+            if belief.counts() {
+                compute(Mean { belief, kernels });
+            }
+        }
         self.stage = Stage::Weighed;
         Ok(())
     }
@@ -278,14 +288,16 @@ impl Recogniser {
     /// Changes the settings of the prior other than the correlation time, and keeps the observations.
     pub(crate) fn set_prior(&mut self, prior: Prior) {
         self.kernels = Kernels::new(&prior, &prior.moments(), &self.table);
+        // The number of components depends on the bandwidth.
+        self.beliefs.fill(Belief::new(&self.kernels));
+        self.scratch = Scratch::new(&self.kernels);
         self.prior = prior;
         self.stage = Stage::Observed;
     }
 
-    /// Returns the share of the movement that was seen at a time, for the estimated duration, and the factors of the bands.
+    /// Returns the factors of the bands for the share of the movement that was seen, of the estimated duration.
     pub(crate) fn factors(&self, duration: f64) -> BandFactors {
-        let [first, last] = self.times.unwrap_or_default();
-        self.prior.calibration().at((last - first) / duration)
+        self.prior.calibration().at(self.clock / duration)
     }
 }
 
@@ -299,6 +311,19 @@ pub(crate) fn check_linear(model: &Model) -> Result<()> {
         return unsuitable("has a time warp, for which there is no recognition: fit it with linear time");
     }
     Ok(())
+}
+
+/// Returns four hypotheses in lanes; the last ones repeat without weight if there are fewer.
+fn four(hypotheses: &[Hypothesis]) -> Hypotheses {
+    let lanes =
+        |of: fn(&Hypothesis) -> f64| F64x4::new([0, 1, 2, 3].map(|k| of(&hypotheses[k.min(hypotheses.len() - 1)])));
+    let weight = [0, 1, 2, 3].map(|k| if k < hypotheses.len() { 0.0 } else { f64::NEG_INFINITY });
+    Hypotheses {
+        duration: lanes(|hypothesis| hypothesis.duration),
+        log: lanes(|hypothesis| hypothesis.log),
+        start: lanes(|hypothesis| hypothesis.start),
+        weight: F64x4::new(weight),
+    }
 }
 
 /// Returns hypotheses of duration, and of start or phase.

@@ -3,10 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 use ndarray::Array2;
 
-use super::evidence::{Belief, Kernels, Scratch};
+use super::evidence::{Belief, Kernels, Weigh};
 use super::movement_table::MovementTable;
 use super::noise_filter::NoiseFilter;
+use super::triangle::square;
 use super::{Calibration, Prior, Recogniser, Settings, Timing};
+use crate::numerics::simd::{F64x4, Kernel};
 use crate::random::Random;
 use crate::{Demonstration, FitOptions, Kind, Model, Sampling, fit};
 
@@ -108,14 +110,16 @@ fn a_hypothesis_equals_dense_conditioning_of_the_mixture() {
         let (q, n) = (table.n_directions, 2 * times.len());
         let (mut rows, mut y) = (DMatrix::zeros(n, q), DVector::zeros(n));
         let mut noise = DMatrix::zeros(n, n);
-        let mut row = vec![0.0; table.width];
+        let mut row = vec![F64x4::ZERO; table.width];
+        let first = |lanes: &F64x4| lanes.to_array()[0];
         for d in 0..2 {
             let block = residual_covariance(&times, prior.residual()[d], prior.settings().correlation_time);
             noise.view_mut((d * times.len(), d * times.len()), (times.len(), times.len())).copy_from(&block);
             for (k, &t) in times.iter().enumerate() {
-                table.row(recogniser.hypotheses[0].fraction(t), d, &mut row);
-                (0..q).for_each(|j| rows[(d * times.len() + k, j)] = row[j]);
-                y[d * times.len() + k] = observed(t)[d] - row[q];
+                let places = table.places([recogniser.hypotheses[0].fraction(t); 4]);
+                table.rows::<F64x4>(&places, d, &mut row);
+                (0..q).for_each(|j| rows[(d * times.len() + k, j)] = first(&row[j]));
+                y[d * times.len() + k] = observed(t)[d] - first(&row[q]);
             }
         }
         // Conditioning of each component by the covariance of the observations.
@@ -143,23 +147,25 @@ fn a_hypothesis_equals_dense_conditioning_of_the_mixture() {
             .iter()
             .zip(&logs)
             .fold(DVector::zeros(q), |sum_of, (mean, l)| sum_of + mean * ((l - largest).exp() / sum));
-        let own = DVector::from_vec(recogniser.beliefs[0].mean.clone());
+        let own = DVector::from_iterator(q, recogniser.beliefs[0].mean.iter().map(first));
         assert!((&own - &mean).norm() < 1e-7 * mean.norm().max(1.0), "{own} {mean}");
 
         // Evidence up to the whitening, which is that of every hypothesis.
-        let size = (q + 1) * table.width;
-        let mut belief = Belief::new(q);
-        belief.update(&recogniser.information[..size], log, &kernels, &mut Scratch::new(&kernels));
+        let mut belief = Belief::new(&kernels);
+        let information = &recogniser.sums[0].information;
+        Weigh { belief: &mut belief, information, log: F64x4::splat(log), kernels: &kernels }.run::<F64x4>();
+        let evidence = first(&belief.weight);
         let white = noise.cholesky().unwrap().l().diagonal().map(f64::ln).sum();
         let dense = largest + sum.ln() - factor.l().diagonal().map(f64::ln).sum() + white;
-        assert!((belief.weight - dense).abs() < 1e-6 * dense.abs().max(1.0), "{} {dense}", belief.weight);
+        assert!((evidence - dense).abs() < 1e-6 * dense.abs().max(1.0), "{evidence} {dense}");
 
         let direction = DVector::from_fn(q, |j, _| (j as f64 + 1.0).recip());
         let within = direction.dot(&direction) * bandwidth * bandwidth
             - bandwidth * bandwidth * direction.dot(&(&gain * (&rows * &direction)));
         let spread: f64 =
             means.iter().zip(&logs).map(|(m, l)| (l - largest).exp() / sum * (m - &mean).dot(&direction).powi(2)).sum();
-        let variance = recogniser.beliefs[0].variance(&mut direction.as_slice().to_vec());
+        let lanes: Vec<F64x4> = direction.iter().map(|x| F64x4::splat(*x)).collect();
+        let variance = first(&square(&recogniser.beliefs[0].covariance, &lanes));
         assert!((variance - within - spread).abs() < 1e-6 * variance, "{variance} {within} {spread}");
     }
 }

@@ -10,12 +10,13 @@
 use std::arch::x86_64::{
     __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _mm_cvtsd_f64, _mm_min_pd, _mm_min_sd, _mm_unpackhi_pd, _mm256_add_pd,
     _mm256_and_pd, _mm256_andnot_pd, _mm256_castpd256_pd128, _mm256_cmp_pd, _mm256_div_pd, _mm256_extractf128_pd,
-    _mm256_load_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_setzero_pd,
-    _mm256_store_pd, _mm256_sub_pd, _mm256_xor_pd,
+    _mm256_load_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_permute2f128_pd,
+    _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_store_pd, _mm256_sub_pd, _mm256_unpackhi_pd,
+    _mm256_unpacklo_pd, _mm256_xor_pd,
 };
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
-use super::simd::{F64x4, Kernel, Real, Register};
+use super::simd::{F64x4, Kernel, Real, Register, WIDTH};
 
 /// Computes a formula.
 ///
@@ -105,6 +106,12 @@ impl Register for Avx2 {
     }
 
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: see `default`.
+        Self(unsafe { _mm256_sqrt_pd(self.0) })
+    }
+
+    #[inline(always)]
     fn fast_min(self, other: Self) -> Self {
         // SAFETY: see `default`.
         Self(unsafe { _mm256_min_pd(self.0, other.0) })
@@ -140,6 +147,22 @@ impl Register for Avx2 {
         unsafe {
             let pair = _mm_min_pd(_mm256_castpd256_pd128(self.0), _mm256_extractf128_pd::<1>(self.0));
             _mm_cvtsd_f64(_mm_min_sd(pair, _mm_unpackhi_pd(pair, pair)))
+        }
+    }
+
+    #[inline(always)]
+    fn transpose(rows: [Self; WIDTH]) -> [Self; WIDTH] {
+        let [a, b, c, d] = rows;
+        // SAFETY: see `default`.
+        unsafe {
+            let (low, high) = (_mm256_unpacklo_pd(a.0, b.0), _mm256_unpackhi_pd(a.0, b.0));
+            let (lower, higher) = (_mm256_unpacklo_pd(c.0, d.0), _mm256_unpackhi_pd(c.0, d.0));
+            [
+                Self(_mm256_permute2f128_pd::<0x20>(low, lower)),
+                Self(_mm256_permute2f128_pd::<0x20>(high, higher)),
+                Self(_mm256_permute2f128_pd::<0x31>(low, lower)),
+                Self(_mm256_permute2f128_pd::<0x31>(high, higher)),
+            ]
         }
     }
 }

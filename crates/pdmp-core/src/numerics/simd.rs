@@ -31,6 +31,8 @@ pub(crate) trait Register:
     fn store(self) -> F64x4;
     /// Returns the magnitudes.
     fn abs(self) -> Self;
+    /// Returns the square roots.
+    fn sqrt(self) -> Self;
     /// Returns the smaller lanes, those of `other` where one is no number.
     fn fast_min(self, other: Self) -> Self;
     /// Returns the larger lanes, those of `other` where one is no number.
@@ -43,6 +45,8 @@ pub(crate) trait Register:
     fn to_bitmask(self) -> u32;
     /// Returns the smallest lane.
     fn smallest(self) -> f64;
+    /// Returns the columns of four rows.
+    fn transpose(rows: [Self; WIDTH]) -> [Self; WIDTH];
 
     /// Returns a register with the same value in all lanes.
     #[inline(always)]
@@ -71,6 +75,11 @@ impl Register for F64x4 {
     #[inline(always)]
     fn abs(self) -> Self {
         Self::abs(self)
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self::sqrt(self)
     }
 
     #[inline(always)]
@@ -103,6 +112,11 @@ impl Register for F64x4 {
         let lesser = |a: f64, b: f64| if a < b { a } else { b };
         let [a, b, c, d] = self.to_array();
         lesser(lesser(a, c), lesser(b, d))
+    }
+
+    #[inline(always)]
+    fn transpose(rows: [Self; WIDTH]) -> [Self; WIDTH] {
+        Self::transpose(rows)
     }
 }
 
@@ -139,6 +153,39 @@ fn compute_portable<K: Kernel>(kernel: K) -> K::Output {
 #[inline(always)]
 pub(crate) fn flush<T: Register>(value: T, rest: T) -> T {
     (value + rest) - rest
+}
+
+/// Returns the exponentials of lanes between −700 and 700, to 4e-16 of them.
+///
+/// With x = k ln 2 + r and |r| ≤ ½ ln 2, it is 2ᵏ times the Taylor polynomial of degree 13 at r.
+#[inline(always)]
+#[allow(clippy::needless_range_loop)]
+pub(crate) fn exp<T: Register>(x: T) -> T {
+    // 1/13! to 1/2!, 1 and 1.
+    const TAYLOR: [f64; 14] = {
+        let (mut terms, mut i) = ([1.0; 14], 1);
+        while i < 14 {
+            terms[13 - i] = terms[14 - i] / i as f64;
+            i += 1;
+        }
+        terms
+    };
+    // A sum with 1.5·2⁵² has the nearest integer in its last bits.
+    const ROUNDING: f64 = 6_755_399_441_055_744.0;
+    // Two parts of ln 2, the first of which is exact in products with integers of eleven bits.
+    const LN_2: [f64; 2] = [0.693_147_180_369_123_816_49, 1.908_214_929_270_587_700_02e-10];
+    let shifted = x * std::f64::consts::LOG2_E + T::splat(ROUNDING);
+    let k = shifted - T::splat(ROUNDING);
+    let r = x - k * LN_2[0] - k * LN_2[1];
+    let mut sum = T::splat(TAYLOR[0]);
+    for i in 1..TAYLOR.len() {
+        sum = sum * r + T::splat(TAYLOR[i]);
+    }
+    let mut power = shifted.store().to_array();
+    for i in 0..WIDTH {
+        power[i] = f64::from_bits((power[i].to_bits() << 52).wrapping_add(1023 << 52));
+    }
+    sum * T::load(&F64x4::new(power))
 }
 
 /// Returns the number of groups for `n` DoFs.
@@ -210,4 +257,20 @@ fn dof_range(n: usize, group: usize) -> Range<usize> {
 /// Returns the first `n` elements of groups.
 pub(crate) fn unpack(lanes: &[F64x4], n: usize) -> &[f64] {
     &bytemuck::cast_slice(lanes)[..n]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exponentials agree with those of the standard library to the last digits.
+    #[test]
+    fn exponentials_are_exact() {
+        for i in -7000..7000 {
+            let x = f64::from(i) * 0.09999 + 0.001;
+            let value = exp(F64x4::splat(x)).to_array()[3];
+            assert!((value / x.exp() - 1.0).abs() < 4e-16, "{x}");
+        }
+        assert_eq!(exp(F64x4::ZERO), F64x4::ONE);
+    }
 }

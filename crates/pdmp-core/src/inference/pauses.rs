@@ -1,0 +1,233 @@
+//! Pauses of a movement that is observed.
+// Closures of iterators stay calls, into which the instructions of larger registers are not inlined.
+#![allow(clippy::needless_range_loop)]
+
+use super::movement_table::{MovementTable, Place};
+use super::noise_filter::{NoiseFilter, WHITE};
+use super::observation::Sums;
+use super::prior::Prior;
+use super::recogniser::Recogniser;
+use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, compute};
+
+/// Length of the windows over which speeds are compared, in mean durations.
+const WINDOW: f64 = 0.04;
+/// Expected number of pauses in a mean duration.
+const RATE: f64 = 0.1;
+/// Mean length of a pause, in mean durations.
+const LENGTH: f64 = 0.5;
+/// Standard deviation of the observed speed, relative to the predicted one. With 0.5, errors of the recordings that do not
+/// pause in docs/recognition.md change by at most 0.005, or 0.025 where the duration is known; with 0.4, those of people
+/// left out grow by up to 60 %.
+const SPEED_DEVIATION: f64 = 0.5;
+/// Probability from which on the clock rests.
+const STOP: f64 = 0.9;
+/// Probability from which on it rests no longer.
+const RESUME: f64 = 0.5;
+/// Largest logarithm of the ratio of likelihoods in a window.
+const MAX_LOG_RATIO: f64 = 8.0;
+
+/// Filter of the probability that a movement has stopped.
+///
+/// A hidden Markov model of two states compares the displacement in a window with the predicted one. With δ the root of the
+/// sum of squares over the DoFs, each relative to the white noise of two positions, ρ = δ/δ_predicted is normal about 1 while
+/// the movement goes on, and about 0 in a pause, of variance 0.5² + 1/δ²_predicted. A movement that is predicted to be slow
+/// is no evidence.
+///
+/// While it is stopped, the clock of the movement rests at the last window that was not slow, and what was observed since
+/// is no part of the sums.
+#[derive(Clone, Debug)]
+pub(crate) struct Pauses {
+    /// Mean duration of the demonstrations, in seconds.
+    duration: f64,
+    /// Variances of the difference of two positions in a pause (D,).
+    variances: Vec<f64>,
+    /// Probability that the movement is stopped.
+    pub(crate) probability: f64,
+    /// Whether the clock of the movement rests.
+    pub(crate) stopped: bool,
+    /// Time of the begin of the window, in seconds.
+    since: f64,
+    /// Positions (D,) and predicted velocities (D,) at the begin of the window, or where it rests.
+    anchor: Vec<f64>,
+    velocity: Vec<f64>,
+    /// The recogniser at the begin of the last window that was not slow.
+    saved: Saved,
+}
+
+/// State to which a recogniser returns.
+#[derive(Clone, Debug)]
+struct Saved {
+    clock: f64,
+    n_observed: usize,
+    noise: NoiseFilter,
+    sums: Vec<Sums>,
+    anchor: Vec<f64>,
+    velocity: Vec<f64>,
+    /// Weights of the hypotheses, and means (q,) of each four of them.
+    weights: Vec<F64x4>,
+    means: Vec<F64x4>,
+}
+
+impl Pauses {
+    pub(crate) fn new(prior: &Prior, noise: &NoiseFilter, sums: &[Sums], n_directions: usize) -> Self {
+        let logs = prior.log_durations();
+        let missing = vec![f64::NAN; prior.residual().len()];
+        let (noise, sums) = (noise.clone(), sums.to_vec());
+        let saved = Saved {
+            clock: 0.0,
+            n_observed: 0,
+            noise,
+            weights: vec![F64x4::ZERO; sums.len()],
+            means: vec![F64x4::ZERO; sums.len() * n_directions],
+            sums,
+            anchor: missing.clone(),
+            velocity: missing.clone(),
+        };
+        Self {
+            duration: (logs.iter().sum::<f64>() / logs.len() as f64).exp(),
+            variances: prior.residual().iter().map(|sd| 2.0 * WHITE * sd * sd).collect(),
+            probability: 0.0,
+            stopped: false,
+            since: f64::NEG_INFINITY,
+            anchor: missing.clone(),
+            velocity: missing,
+            saved,
+        }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        (self.probability, self.stopped, self.since) = (0.0, false, f64::NEG_INFINITY);
+        self.velocity.fill(f64::NAN);
+    }
+
+    /// Returns the logarithm of the ratio of the likelihoods of a pause and of a movement that goes on.
+    fn log_ratio(&self, span: f64, position: &[f64]) -> f64 {
+        let (mut moved, mut predicted) = (0.0, 0.0);
+        for (d, y) in position.iter().enumerate() {
+            let (own, expected) = (y - self.anchor[d], span * self.velocity[d]);
+            if !(own + expected).is_nan() {
+                // The squares of the noise add one of each DoF.
+                moved += own * own / self.variances[d] - 1.0;
+                predicted += expected * expected / self.variances[d];
+            }
+        }
+        // Over longer intervals the velocity is not constant.
+        if predicted <= 0.0 || span > 2.0 * WINDOW * self.duration {
+            return 0.0;
+        }
+        let ratio = (moved.max(0.0) / predicted).sqrt();
+        let variance = SPEED_DEVIATION * SPEED_DEVIATION + predicted.recip();
+        ((0.5 - ratio) / variance).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO)
+    }
+
+    /// Includes a window, and returns the logarithm of its ratio.
+    fn filter(&mut self, span: f64, position: &[f64]) -> f64 {
+        let log_ratio = self.log_ratio(span, position);
+        let steps = span / self.duration;
+        let (stays, begins) = ((-steps / LENGTH).exp(), 1.0 - (-steps * RATE).exp());
+        let before = self.probability * stays + (1.0 - self.probability) * begins;
+        let odds = before / (1.0 - before) * log_ratio.exp();
+        self.probability = odds / (1.0 + odds);
+        log_ratio
+    }
+}
+
+impl Recogniser {
+    /// Compares the displacement with the predicted one at the end of a window: stops the clock, lets it run on, or begins
+    /// the next window.
+    pub(crate) fn watch(&mut self, time: f64, position: &[f64]) {
+        let Some(pauses) = &mut self.pauses else { return };
+        let span = time - pauses.since;
+        if span < WINDOW * pauses.duration {
+            return;
+        }
+        let log_ratio = if pauses.velocity[0].is_nan() { 0.0 } else { pauses.filter(span, position) };
+        match (pauses.stopped, pauses.probability > if pauses.stopped { RESUME } else { STOP }) {
+            (true, true) => pauses.since = time,
+            (false, true) => {
+                let Saved { clock, n_observed, noise, sums, anchor, velocity, .. } = &pauses.saved;
+                (self.clock, self.n_observed) = (*clock, *n_observed);
+                self.noise.copy_from(noise);
+                self.sums.iter_mut().zip(sums).for_each(|(to, from)| to.copy_from(from));
+                pauses.anchor.copy_from_slice(anchor);
+                pauses.velocity.copy_from_slice(velocity);
+                (pauses.stopped, pauses.since) = (true, time);
+            }
+            (stopped, false) => {
+                pauses.stopped = false;
+                if stopped {
+                    self.include(span, position);
+                }
+                self.begin_window(time, position, log_ratio <= 0.0);
+            }
+        }
+    }
+
+    /// Begins a window, and keeps the state if it is one of a movement that goes on. The velocity is that of the state that
+    /// is kept: later observations, of a pause, would be taken for a slow movement.
+    fn begin_window(&mut self, time: f64, position: &[f64], keep: bool) {
+        let known = !keep || self.weigh().is_ok();
+        let Self { pauses, beliefs, fours, table, rows, .. } = self;
+        let Some(pauses) = pauses else { return };
+        let Pauses { saved, velocity, .. } = pauses;
+        pauses.since = time;
+        pauses.anchor.copy_from_slice(position);
+        if keep && known {
+            let means = saved.means.chunks_exact_mut(table.n_directions);
+            for ((belief, weight), mean) in beliefs.iter().zip(&mut saved.weights).zip(means) {
+                *weight = if belief.counts() { belief.weight } else { F64x4::ZERO };
+                mean.copy_from_slice(&belief.mean);
+            }
+        }
+        velocity.fill(if known { 0.0 } else { f64::NAN });
+        let window = WINDOW * pauses.duration;
+        let sum: f64 = saved.weights.iter().map(|weight| weight.reduce_add()).sum();
+        let means = saved.means.chunks_exact(table.n_directions);
+        for ((&weight, mean), four) in saved.weights.iter().zip(means).zip(&*fours) {
+            if known && weight != F64x4::ZERO {
+                let places = [self.clock, self.clock + window].map(|clock| table.places(four.fraction(clock)));
+                let scale = F64x4::splat((sum * window).recip());
+                compute(Advance { weight: weight * scale, mean, table, places, rows, velocity });
+            }
+        }
+        if keep {
+            (saved.clock, saved.n_observed) = (self.clock, self.n_observed);
+            saved.noise.copy_from(&self.noise);
+            saved.sums.iter_mut().zip(&self.sums).for_each(|(to, from)| to.copy_from(from));
+            saved.anchor.copy_from_slice(&pauses.anchor);
+            saved.velocity.copy_from_slice(velocity);
+        }
+    }
+}
+
+/// Kernel that adds the mean displacements between two places, by weight.
+struct Advance<'a> {
+    weight: F64x4,
+    mean: &'a [F64x4],
+    table: &'a MovementTable,
+    places: [[Place; WIDTH]; 2],
+    /// Memory of two rows (w,).
+    rows: &'a mut [F64x4],
+    velocity: &'a mut [f64],
+}
+
+impl Kernel for Advance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { weight, mean, table, places: [from, to], rows, velocity } = self;
+        let (q, width) = (table.n_directions, table.width);
+        let (before, after) = rows[..2 * width].split_at_mut(width);
+        let weight = T::load(&weight);
+        for d in 0..velocity.len() {
+            table.rows::<T>(&from, d, before);
+            table.rows::<T>(&to, d, after);
+            let mut sum = T::load(&after[q]) - T::load(&before[q]);
+            for i in 0..q {
+                sum = sum + (T::load(&after[i]) - T::load(&before[i])) * T::load(&mean[i]);
+            }
+            velocity[d] += (sum * weight).store().reduce_add();
+        }
+    }
+}
