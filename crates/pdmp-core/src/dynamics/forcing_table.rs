@@ -111,7 +111,7 @@ struct Cubic([F64x4; 4]);
 
 /// Position in the table: the index of the first cubic at a knot, and the argument of the cubics: the clock since that knot,
 /// or p past the end.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TableIndex {
     first: usize,
     pub(crate) t: f64,
@@ -346,14 +346,19 @@ impl ForcingTable {
 
     /// Prefetches the cubics at clock `u`, since a table may exceed the first-level cache.
     #[inline(always)]
-    #[allow(unsafe_code)]
     pub(crate) fn prefetch(&self, u: f64) {
+        self.prefetch_at(self.demonstrated_index(u));
+    }
+
+    /// Prefetches the cubics at a position.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub(crate) fn prefetch_at(&self, index: TableIndex) {
         #[cfg(target_arch = "x86_64")]
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
-            let start = self.demonstrated_index(u).first;
-            for Cubic([first, _, third, _]) in &self.cubics[start..start + self.knot_stride] {
+            for Cubic([first, _, third, _]) in &self.cubics[index.first..index.first + self.knot_stride] {
                 // SAFETY: SSE is part of x86-64, and a prefetch is a hint that never faults and reads no value. The
                 // addresses are those of elements of `cubics`.
                 unsafe {
@@ -367,9 +372,9 @@ impl ForcingTable {
     /// Returns the forcing Σⱼ sⱼwⱼ of a style and its slope, for one group of DoFs.
     #[inline(always)]
     pub(crate) fn sample<T: Register>(&self, index: TableIndex, group: usize, style: &[f64]) -> CubicSample<T> {
-        let mut sum = [T::default(); 4];
-        for (s, cubic) in style.iter().zip(self.cubics(index.first, group)) {
-            accumulate(&mut sum, cubic.load(), *s);
+        let (mut sum, cubics) = ([T::default(); 4], self.cubics(index.first, group));
+        for j in 0..style.len().min(cubics.len()) {
+            accumulate(&mut sum, cubics[j].load(), style[j]);
         }
         evaluate(sum, index.t)
     }
@@ -383,10 +388,11 @@ impl ForcingTable {
         styles: [&[f64]; 2],
     ) -> [CubicSample<T>; 2] {
         let mut sums = [[T::default(); 4]; 2];
-        for ((s, v), cubic) in styles[0].iter().zip(styles[1]).zip(self.cubics(index.first, group)) {
-            let cubic = cubic.load();
-            accumulate(&mut sums[0], cubic, *s);
-            accumulate(&mut sums[1], cubic, *v);
+        let ([style, rate], cubics) = (styles, self.cubics(index.first, group));
+        for j in 0..cubics.len().min(style.len()).min(rate.len()) {
+            let cubic = cubics[j].load();
+            accumulate(&mut sums[0], cubic, style[j]);
+            accumulate(&mut sums[1], cubic, rate[j]);
         }
         [evaluate(sums[0], index.t), evaluate(sums[1], index.t)]
     }
@@ -394,7 +400,7 @@ impl ForcingTable {
 
 #[inline(always)]
 fn accumulate<T: Real>(sum: &mut [T; 4], cubic: [T; 4], weight: f64) {
-    for (sum, coefficient) in sum.iter_mut().zip(cubic) {
-        *sum = *sum + coefficient * weight;
+    for i in 0..4 {
+        sum[i] = sum[i] + cubic[i] * weight;
     }
 }

@@ -123,11 +123,13 @@ impl<T: Register> Row<T> {
     #[inline(always)]
     fn of_turn(turn: &TurnDerivatives, acceleration: f64, twice: f64) -> [Self; SIDE_GROUPS] {
         let [beta, along, across] = in_plane(turn, twice);
-        NORMALS.map(|[cosine, sine]| {
-            let [cosine, sine] = [cosine, sine].map(|x| T::load(&F64x4::new(x)));
+        let mut rows = [Self { slope: T::default(), half: T::default() }; SIDE_GROUPS];
+        for (row, [cosine, sine]) in rows.iter_mut().zip(NORMALS) {
+            let (cosine, sine) = (T::load(&F64x4::new(cosine)), T::load(&F64x4::new(sine)));
             let side = Derivatives { slope: cosine * beta, bend: cosine * along + sine * across };
-            Self::new(side, T::splat(SIDE * acceleration), 0.0)
-        })
+            *row = Self::new(side, T::splat(SIDE * acceleration), 0.0);
+        }
+        rows
     }
 
     #[inline(always)]
@@ -172,7 +174,7 @@ impl IntervalLimits {
         let interval = path.interval(i);
         let [mut at_start, mut in_middle] = [T::default(); 2];
         for (ends, limits) in path.ends(i, limits) {
-            let ([here, next], acceleration) = (ends.map(Derivatives::<T>::load), T::load(&limits.acceleration));
+            let ([here, next], acceleration) = (Derivatives::<T>::load_both(ends), T::load(&limits.acceleration));
             let middle = here.between(next, interval, 0.5);
             at_start = at_start.fast_max(limits.of_velocity(here.slope));
             in_middle = in_middle.fast_max(limits.of_velocity(middle.slope));

@@ -44,6 +44,17 @@ pub(crate) trait Register:
     /// Returns the smallest lane.
     fn smallest(self) -> f64;
 
+    /// Loads several groups.
+    #[inline(always)]
+    fn load_all<const N: usize>(lanes: [&F64x4; N]) -> [Self; N] {
+        let (mut registers, mut i) = ([Self::default(); N], 0);
+        while i < N {
+            registers[i] = Self::load(lanes[i]);
+            i += 1;
+        }
+        registers
+    }
+
     /// Returns a register with the same value in all lanes.
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -107,6 +118,9 @@ impl Register for F64x4 {
 }
 
 /// Formula in registers of any type.
+///
+/// No closure in it computes with registers, as in `[a, b].map(|x| x * y)`: a closure is a function of its own, which lacks
+/// the target feature, so that operations remain calls in it.
 pub(crate) trait Kernel {
     type Output;
 

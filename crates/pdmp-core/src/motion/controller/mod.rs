@@ -29,6 +29,7 @@ mod settling;
 mod snapshot;
 mod start;
 pub(in crate::motion) mod steady;
+mod steady_tick;
 mod step;
 mod synchronous;
 mod turning;
