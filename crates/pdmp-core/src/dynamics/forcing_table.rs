@@ -117,6 +117,14 @@ pub(crate) struct TableIndex {
     pub(crate) t: f64,
 }
 
+impl TableIndex {
+    /// Returns whether both lie in one cell.
+    #[inline(always)]
+    pub(crate) fn is_in_cell_of(self, other: Self) -> bool {
+        self.first == other.first
+    }
+}
+
 impl Cubic {
     /// Returns the cubic with given values and slopes at both ends of a cell.
     fn hermite(from: CubicSample<F64x4>, to: CubicSample<F64x4>, cell_width: f64) -> Self {
@@ -372,7 +380,10 @@ impl ForcingTable {
     /// Returns the forcing Σⱼ sⱼwⱼ of a style and its slope, for one group of DoFs.
     #[inline(always)]
     pub(crate) fn sample<T: Register>(&self, index: TableIndex, group: usize, style: &[f64]) -> CubicSample<T> {
-        let (mut sum, cubics) = ([T::default(); 4], self.cubics(index.first, group));
+        let cubics = self.cubics(index.first, group);
+        let ([s, style @ ..], [cubic, cubics @ ..]) = (style, cubics) else { return CubicSample::default() };
+        let [value, slope, square, cube] = cubic.load::<T>();
+        let mut sum = [value * *s, slope * *s, square * *s, cube * *s];
         for j in 0..style.len().min(cubics.len()) {
             accumulate(&mut sum, cubics[j].load(), style[j]);
         }

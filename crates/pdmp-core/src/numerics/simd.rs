@@ -140,6 +140,22 @@ pub(crate) fn compute<K: Kernel>(kernel: K) -> K::Output {
     compute_portable(kernel)
 }
 
+/// Computes a formula of many steps in the largest registers of the processor, with code of its own for more processors than
+/// [`compute`].
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(crate) fn compute_many<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2")
+        && std::arch::is_x86_feature_detected!("avx512f")
+        && std::arch::is_x86_feature_detected!("avx512vl")
+    {
+        // SAFETY: the processor has these features.
+        return unsafe { super::avx::compute_by_more_registers(kernel) };
+    }
+    compute(kernel)
+}
+
 /// Computes a formula with the instructions of every processor. It stays a call, so that its callers stay small.
 #[inline(never)]
 fn compute_portable<K: Kernel>(kernel: K) -> K::Output {

@@ -10,11 +10,12 @@ use super::steady_tick::Steps;
 use super::step::{MAX_SUBSTEPS, ROUNDING, first_element};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum};
+use crate::dynamics::forcing_table::TableIndex;
 use crate::dynamics::output_system::{CubicSample, Propagator, State};
 use crate::dynamics::transport::TransportSample;
 use crate::model::primitive::Primitive;
 use crate::motion::command::Command;
-use crate::numerics::simd::{F64x4, compute, groups};
+use crate::numerics::simd::{F64x4, compute_many, groups};
 
 /// Clock and scalar state of a movement, in one line of the cache.
 #[derive(Clone, Copy, Debug)]
@@ -247,6 +248,6 @@ impl SteadyMovements {
         rows: &mut Rows,
         ending: &mut Vec<u32>,
     ) {
-        compute(Steps { movements: self, primitive, tick, mask, rows, ending });
+        compute_many(Steps { movements: self, primitive, tick, mask, rows, ending, last: TableIndex::default() });
     }
 }

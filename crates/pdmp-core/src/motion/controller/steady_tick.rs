@@ -24,6 +24,8 @@ pub(super) struct Steps<'a, 'b> {
     pub(super) mask: Option<&'a [bool]>,
     pub(super) rows: &'a mut Rows<'b>,
     pub(super) ending: &'a mut Vec<u32>,
+    /// Position in the forcing table that was prefetched last.
+    pub(super) last: TableIndex,
 }
 
 /// Clock of a movement over a substep.
@@ -87,7 +89,7 @@ impl Steps<'_, '_> {
     /// Advances the clock of a movement by a substep.
     #[inline(always)]
     fn begin<const RHYTHMIC: bool>(&mut self, place: usize) -> Substep {
-        let Self { movements: SteadyMovements { clocks, amplitudes, .. }, primitive, .. } = self;
+        let Self { movements: SteadyMovements { clocks, amplitudes, .. }, primitive, last, .. } = self;
         let clock = &mut clocks[place];
         clock.clock.add(clock.h);
         let mut r = [1.0, 0.0];
@@ -97,16 +99,14 @@ impl Steps<'_, '_> {
             *value = amplitude(mu, *value, *target, clock.h);
             r = [*value, mu * (*target - *value)];
         }
-        let (u, transport) = (clock.clock.value(), &primitive.transport);
-        let mut segment = transport.segment_of_cell(usize::from(clock.cell));
-        if !segment.reaches(u) {
-            segment = transport.segment_at(u);
-            clock.cell = transport.cell(&segment) as u16;
-        }
-        let TransportSample { value, slope, bend } = segment.lag(u);
+        let u = clock.clock.value();
+        let TransportSample { value, slope, bend } = primitive.transport.lag_from(&mut clock.cell, u);
         let lags = [std::mem::replace(&mut clock.lag, value), value];
         let index = primitive.forcing_table().demonstrated_index(u);
-        primitive.forcing_table().prefetch_at(index);
+        if !index.is_in_cell_of(*last) {
+            primitive.forcing_table().prefetch_at(index);
+        }
+        *last = index;
         let propagator = clock.propagator as usize;
         Substep { place, propagator, index, rate: clock.rate, r, lags, frame_slopes: [slope, bend] }
     }
@@ -120,8 +120,7 @@ impl Steps<'_, '_> {
         let (table, attractor) = (primitive.forcing_table(), primitive.attractor());
         let flush_level = T::splat(self.tick.flush_level);
         for &Substep { place, propagator, index, rate, r, lags, frame_slopes } in substeps {
-            let [r, r_slope] = if RHYTHMIC { r } else { [1.0, 0.0] };
-            let gate = Gate { r, r_slope, phase_rate: 1.0, rate: [rate, 0.0] };
+            let gate = Gate { r: r[0], r_slope: r[1], phase_rate: 1.0, rate: [rate, 0.0] };
             let propagator = &movements.propagators[propagator];
             let style = unpack(&movements.styles[place * n_style_groups..][..n_style_groups], n_styles);
             let row = place * n_dofs..(place + 1) * n_dofs;
@@ -131,7 +130,13 @@ impl Steps<'_, '_> {
             let groups = &mut movements.groups[place * n_groups..][..n_groups];
             for (group, state) in groups.iter_mut().enumerate() {
                 let from = CubicSample { value: T::load(&state.w.value), slope: T::load(&state.w.slope) };
-                let to = gate.forcing::<T>(&ForcingSample::read::<T>(table, index, group, style, None));
+                let to = if RHYTHMIC {
+                    gate.forcing::<T>(&ForcingSample::read::<T>(table, index, group, style, None))
+                } else {
+                    // The same for r = 1 and r′ = 0, with one of the sums with zero, which gives zero its sign.
+                    let CubicSample { value, slope } = table.sample::<T>(index, group, style);
+                    CubicSample { value, slope: slope + T::default() }
+                };
                 state.w = CubicSample { value: to.value.store(), slope: to.slope.store() };
                 let (centre, displacement) = (T::load(&state.centre), T::load(&state.displacement));
                 let (start, origin) = (centre + displacement * lags[0], centre + displacement * lags[1]);
