@@ -3,10 +3,10 @@
 //! The forcing of each style dimension and DoF is stored as a piecewise cubic Hermite interpolant on a uniform grid of the
 //! clock, independently of the regressor that it was learnt by.
 
-use crate::dynamics::braking::Braking;
+use crate::dynamics::braking::{BrakedMotion, Braking};
 use crate::dynamics::canonical::{Canonical, faded, turn};
 use crate::dynamics::hermite_table::KnotTable;
-use crate::dynamics::output_system::{Attractor, CubicSample, State};
+use crate::dynamics::output_system::{Attractor, CubicSample};
 use crate::numerics::simd::{F64x4, Real, Register, WIDTH, groups};
 
 /// Forcing w of unit styles over the clock: x·b(x; W) for a discrete movement, b(φ; W) for a rhythmic one.
@@ -63,31 +63,6 @@ pub(crate) struct Fade {
     p: f64,
     /// p′.
     pub(crate) p_slope: f64,
-}
-
-/// Motion past the end due to the forcing w = r·(a + b·p) of a movement that brakes: e = b·e₁ and z = b·z₁ − a·r solve
-/// e′ = z + w about the goal.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BrakedMotion {
-    r: f64,
-    p: f64,
-    /// e₁ and z₁.
-    unit: State<f64>,
-    /// Maximum of e₁ from the clock on.
-    max_displacement: f64,
-}
-
-impl BrakedMotion {
-    /// Returns the state for a + b·p as value and b as slope.
-    pub(crate) fn state(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> State<F64x4> {
-        let a = value - slope * self.p;
-        State { e: slope * self.unit.e, z: slope * self.unit.z - a * self.r }
-    }
-
-    /// Returns the maximum of |e| from the clock on.
-    pub(crate) fn max_displacement(&self, slope: F64x4) -> F64x4 {
-        slope.abs() * self.max_displacement
-    }
 }
 
 /// Upper bound of |w|, without the part that decays as z does, from a clock past the end on: of a + b·p and of b.
@@ -379,6 +354,7 @@ impl ForcingTable {
 
     /// Returns the forcing Σⱼ sⱼwⱼ of a style and its slope, for one group of DoFs.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // See `Kernel`.
     pub(crate) fn sample<T: Register>(&self, index: TableIndex, group: usize, style: &[f64]) -> CubicSample<T> {
         let cubics = self.cubics(index.first, group);
         let ([s, style @ ..], [cubic, cubics @ ..]) = (style, cubics) else { return CubicSample::default() };
@@ -392,6 +368,7 @@ impl ForcingTable {
 
     /// Returns the forcings of two styles. Each cubic is loaded once for both.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // See `Kernel`.
     pub(crate) fn sample_pair<T: Register>(
         &self,
         index: TableIndex,
@@ -410,6 +387,7 @@ impl ForcingTable {
 }
 
 #[inline(always)]
+#[allow(clippy::needless_range_loop)] // See `Kernel`.
 fn accumulate<T: Real>(sum: &mut [T; 4], cubic: [T; 4], weight: f64) {
     for i in 0..4 {
         sum[i] = sum[i] + cubic[i] * weight;

@@ -174,5 +174,9 @@ fn sample([value, slope, square, cube]: &[f64; 4], t: f64) -> TransportSample {
     let rest = cube * t;
     let bend = square + rest;
     let twice = bend + bend;
-    TransportSample { value: value + t * (slope + t * bend), slope: slope + t * (twice + rest), bend: twice + 4.0 * rest }
+    TransportSample {
+        value: value + t * (slope + t * bend),
+        slope: slope + t * (twice + rest),
+        bend: twice + 4.0 * rest,
+    }
 }

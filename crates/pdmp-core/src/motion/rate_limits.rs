@@ -194,17 +194,15 @@ impl IntervalLimits {
             let middle = here.between(&next, interval, 0.5);
             let at = [&here, &middle].map(|turn| of_angular_velocity(limits, turn.slope));
             by_turns = [by_turns[0].max(at[0]), by_turns[1].max(at[1])];
-            let mut visit_turn = |turn: &TurnDerivatives, twice: f64| {
-                Row::of_turn(turn, limits.acceleration, twice).into_iter().for_each(&mut visit);
-            };
-            visit_turn(&here, 0.0);
-            visit_turn(&middle, interval);
-            visit_turn(&next, 2.0 * interval);
+            visit_turn(&here, limits.acceleration, 0.0, &mut visit);
+            visit_turn(&middle, limits.acceleration, interval, &mut visit);
+            visit_turn(&next, limits.acceleration, 2.0 * interval, &mut visit);
             let [slopes, bends] =
                 [[here.slope, next.slope], [here.bend, next.bend]].map(|ends| ends.map(|v| dot(v, v).sqrt()));
             if bends[0].max(bends[1]) * (REVERSAL * interval) > slopes[0].min(slopes[1]) {
-                visit_turn(&here.between(&next, interval, 0.25), 0.5 * interval);
-                visit_turn(&here.between(&next, interval, 0.75), 1.5 * interval);
+                let (first, last) = (here.between(&next, interval, 0.25), here.between(&next, interval, 0.75));
+                visit_turn(&first, limits.acceleration, 0.5 * interval, &mut visit);
+                visit_turn(&last, limits.acceleration, 1.5 * interval, &mut visit);
             }
         }
         self.most = largest(at_start).max(by_turns[0]).recip();
@@ -291,6 +289,16 @@ impl IntervalLimits {
             }
         }
         (x, leads)
+    }
+}
+
+/// Visits the rows of a rotation.
+#[inline(always)]
+#[allow(clippy::needless_range_loop)] // See `Kernel`.
+fn visit_turn<T: Register>(turn: &TurnDerivatives, acceleration: f64, twice: f64, visit: &mut impl FnMut(Row<T>)) {
+    let rows = Row::of_turn(turn, acceleration, twice);
+    for i in 0..SIDE_GROUPS {
+        visit(rows[i]);
     }
 }
 
