@@ -29,7 +29,6 @@ mod settling;
 mod snapshot;
 mod start;
 pub(in crate::motion) mod steady;
-mod steady_tick;
 mod step;
 mod synchronous;
 mod turning;

@@ -5,8 +5,9 @@
 //! are the same functions of the same numbers, so that the motion is that of a [`Controller`] to the bit. The state of a
 //! movement takes 0.5 kB in consecutive memory (D = 7), a controller 4 kB in some thirty allocations.
 
+mod tick;
+
 use super::group::add_frame_motion;
-use super::steady_tick::Steps;
 use super::step::{MAX_SUBSTEPS, ROUNDING, first_element};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum};
@@ -16,36 +17,37 @@ use crate::dynamics::transport::TransportSample;
 use crate::model::primitive::Primitive;
 use crate::motion::command::Command;
 use crate::numerics::simd::{F64x4, compute_many, groups};
+use tick::Steps;
 
 /// Clock and scalar state of a movement, in one line of the cache.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct SteadyClock {
-    pub(super) time: CompensatedSum,
-    pub(super) clock: CompensatedSum,
+struct SteadyClock {
+    time: CompensatedSum,
+    clock: CompensatedSum,
     /// ρ.
-    pub(super) rate: f64,
+    rate: f64,
     /// Clock interval of a substep.
-    pub(super) h: f64,
+    h: f64,
     /// Lag ℓ of the frame at the clock.
-    pub(super) lag: f64,
+    lag: f64,
     /// Place whose propagator the movement uses: an earlier movement of the same rate, or itself.
-    pub(super) propagator: u32,
+    propagator: u32,
     /// Cell of the transport profile.
-    pub(super) cell: u16,
+    cell: u16,
     /// Number of substeps of a tick.
-    pub(super) n_substeps: u16,
+    n_substeps: u16,
 }
 
 /// State and commands of a group of DoFs.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
-pub(super) struct SteadyGroup {
-    pub(super) position: F64x4,
-    pub(super) z: F64x4,
-    pub(super) w: CubicSample<F64x4>,
-    pub(super) centre: F64x4,
-    pub(super) displacement: F64x4,
+struct SteadyGroup {
+    position: F64x4,
+    z: F64x4,
+    w: CubicSample<F64x4>,
+    centre: F64x4,
+    displacement: F64x4,
 }
 
 /// Output of many movements, by rows (B, D) of the caller.
@@ -59,28 +61,28 @@ pub(in crate::motion) struct Rows<'a> {
 /// Settings of a tick that all movements share.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::motion) struct SteadyTick {
-    pub(super) dt: f64,
-    pub(super) flush_level: f64,
+    dt: f64,
+    flush_level: f64,
 }
 
 /// Places for movements of one primitive, steady or empty.
 #[derive(Clone, Debug)]
 pub(in crate::motion) struct SteadyMovements {
-    pub(super) n_groups: usize,
-    pub(super) n_style_groups: usize,
-    pub(super) is_steady: Vec<bool>,
+    n_groups: usize,
+    n_style_groups: usize,
+    is_steady: Vec<bool>,
     /// Number of movements.
     n_steady: usize,
-    pub(super) clocks: Vec<SteadyClock>,
+    clocks: Vec<SteadyClock>,
     /// Amplitudes r, and their commands r₀.
-    pub(super) amplitudes: Vec<[f64; 2]>,
-    pub(super) propagators: Vec<Propagator>,
+    amplitudes: Vec<[f64; 2]>,
+    propagators: Vec<Propagator>,
     /// Number of movements that use the propagator of a place.
     n_users: Vec<u32>,
     /// Place of the propagator that was used last.
     last_propagator: usize,
-    pub(super) groups: Vec<SteadyGroup>,
-    pub(super) styles: Vec<F64x4>,
+    groups: Vec<SteadyGroup>,
+    styles: Vec<F64x4>,
 }
 
 impl Controller {

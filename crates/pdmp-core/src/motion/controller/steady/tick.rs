@@ -3,9 +3,9 @@
 //! A block first advances the clocks of its movements and finds their places in the tables, then their output systems:
 //! the second part waits for neither the first nor the memory of the forcing table.
 
-use super::group::{ForcingSample, Gate, add_frame_motion};
-use super::steady::{Rows, SteadyMovements, SteadyTick};
-use super::step::ROUNDING;
+use super::super::group::{ForcingSample, Gate, add_frame_motion};
+use super::super::step::ROUNDING;
+use super::{Rows, SteadyMovements, SteadyTick};
 use crate::dynamics::canonical::{Canonical, amplitude};
 use crate::dynamics::forcing_table::TableIndex;
 use crate::dynamics::output_system::{CubicSample, State};
