@@ -74,7 +74,7 @@ bench-controllers: .venv/with-demo  ## A tick of 4096 movements in Python: toget
 bench-scaling: .venv/with-peers  ## Draws how the time to learn grows with the data, into docs/scaling.png
 	OMP_NUM_THREADS=1 $(BIN)/python benches/scaling.py
 
-bench-streaming: .venv/with-peers  ## Fits of a thousand to a hundred thousand demonstrations in blocks, and their memory
+bench-streaming: .venv/with-peers  ## Fits of a thousand to a hundred thousand demonstrations in blocks, and their memory, into docs/streaming.png
 	OMP_NUM_THREADS=1 $(BIN)/python benches/streaming.py
 
 bench-bases: .venv/with-demo  ## How well each basis reproduces and predicts the recordings in PDMP_DATA

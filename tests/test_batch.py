@@ -99,9 +99,49 @@ def test_batch_takes_contexts_of_each_movement() -> None:
     slow = [np.column_stack([ramp, h * ramp]) for h in heights]
     timed = [pdmp.Demonstration(y, dt=0.01 + 0.02 * h) for y, h in zip(slow, heights, strict=True)]
     model = pdmp.fit(timed, contexts=heights[:, None], n_styles=1)
-    with pytest.raises(ValueError, match="tau differs between the movements: a batch has one; pa"):
-        model.rollouts(context=contexts)
+    (paced,) = model.rollouts(context=contexts, derivatives=0, dt=0.05)
+    predicted = [model.predict(context).conditions.segment_durations for context in contexts]
+    for b, context in enumerate(contexts):
+        expected = model.rollout(
+            context=context, dt=0.05, duration=max(map(sum, predicted))
+        ).position
+        np.testing.assert_array_equal(paced[b], expected)
     assert model.rollouts(context=contexts, tau=1.0)[0].shape[0] == 3
+
+
+def test_timing_and_amplitude_of_each_movement(reach: pdmp.Model, cycle: pdmp.Model) -> None:
+    """Arrays (B,) of tau and phase give rollouts to the bit, those of amplitude to 1e-12."""
+    taus = np.array([0.5, 0.8, 1.1, 2.0])
+    for model, more in ((reach, {}), (cycle, {"phase": [0.0, 1.0, 2.0, 3.0]})):
+        made = model.rollouts(style=STYLES[:4], tau=taus, derivatives=2, dt=0.02, **more)
+        longest = model.rollout(tau=taus.max(), dt=0.02).time[-1]
+        listed = [
+            pdmp.Conditions(
+                style=STYLES[b], tau=taus[b], **{name: of[b] for name, of in more.items()}
+            )
+            for b in range(4)
+        ]
+        again = model.rollouts(listed, derivatives=2, dt=0.02)
+        for b, conditions in enumerate(listed):
+            single = model.rollout(conditions, dt=0.02, duration=longest)
+            for order, name in enumerate(("position", "velocity", "acceleration")):
+                np.testing.assert_array_equal(made[order][b], getattr(single, name))
+                np.testing.assert_array_equal(again[order][b], getattr(single, name))
+    amplitudes = [0.0, 0.5, 1.0, 2.0]
+    positions, _ = cycle.rollouts(style=STYLES[:4], amplitude=amplitudes)
+    for b, amplitude in enumerate(amplitudes):
+        expected = cycle.rollout(style=STYLES[b], amplitude=amplitude).position
+        np.testing.assert_allclose(positions[b], expected, atol=1e-12)
+    for given, message in (
+        ({"tau": taus[:3]}, "tau has 3 rows, but there are 4 movements"),
+        ({"tau": [[1.0]] * 4}, r"tau has shape \[4, 1\], expected a number or \(B,\)"),
+        ({"tau": [1.0, -1.0, 1.0, 1.0]}, "tau = -1"),
+        ({"amplitude": taus}, "amplitude does not apply"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            reach.rollouts(style=STYLES[:4], **given)
+    with pytest.raises(ValueError, match="conditions must have one tau"):
+        reach.rollouts_vjp("goal", np.ones((4, 11, 2)), tau=taus, dt=0.1, duration=1.0)
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.4, 2.5])

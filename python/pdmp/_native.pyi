@@ -1233,7 +1233,7 @@ class Model:
         derivatives: int = 1,  # at most 2
         out: Sequence[_Array] | None = None,
         threads: int | None = None,
-        **changes: Unpack[_Changes],  # vectors (n,) or (B, n)
+        **changes: Unpack[_RowChanges],  # vectors (n,) or (B, n)
     ) -> tuple[_Array, ...]:  # position and its `derivatives`, each (B, T, D)
         """Computes the movements of many conditions.
 
@@ -1241,15 +1241,18 @@ class Model:
         response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
         to rounding.
 
-        All movements share time constant and amplitude; they follow linear time and start at phase 0.
+        Movements that differ in tau, follow `segment_durations`, or start at a `phase` have no response curves in
+        common: each then costs a rollout, which it equals to the bit. All are sampled at the same times. Without
+        `duration`, these reach to the end of the longest movement; the others continue past their end as in `rollout`,
+        discrete ones at rest on their goal.
 
         Parameters
         ----------
         conditions : Conditions, or B Conditions, optional
             Conditions of all movements, or of each.
         context : array_like or list, (Q,) or (B, Q), optional
-            Context of all movements, or of each, whose prediction supplies absent conditions. Pass `tau` where the
-            predicted durations differ.
+            Context of all movements, or of each, whose prediction supplies absent conditions, durations included. One
+            `tau` for all keeps the response curves.
         dt : float
             Interval between samples in s.
         duration : float, optional
@@ -1261,8 +1264,8 @@ class Model:
         threads : int, optional
             Largest number of threads; by default all that the system offers. Results do not depend on it.
         **changes
-            Single conditions by name, which replace those of `conditions`; see `Conditions`. Style, goal, start,
-            velocity, goal_velocity and anchor may have a leading axis, with one row for each of B movements.
+            Single conditions by name, which replace those of `conditions`; see `Conditions`. All may have a leading axis
+            with one entry for each of B movements: vectors (B, n), and tau, amplitude and phase (B,).
 
         Returns
         -------
@@ -1273,7 +1276,7 @@ class Model:
         ------
         ValueError
             An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit;
-            leading axes, time constants or amplitudes differ. Nothing is written then.
+            leading axes differ. Nothing is written then.
         TypeError
             A keyword is unknown, or `conditions` has another type.
         MemoryError
@@ -1284,6 +1287,7 @@ class Model:
         >>> positions, velocities = model.rollouts(style=model.styles, goal=model.goals, dt=0.1)
         >>> positions.shape
         (5, 13, 2)
+        >>> at_own_pace, _ = model.rollouts(style=model.styles, tau=[0.6, 0.8, 1.0, 1.2, 1.4], dt=0.1)
         """
     def rollouts_vjp(
         self,
@@ -1295,7 +1299,7 @@ class Model:
         duration: float | None = None,
         context: _Context | _Contexts | None = None,
         threads: int | None = None,
-        **changes: Unpack[_Changes],  # vectors (n,) or (B, n)
+        **changes: Unpack[_RowChanges],  # vectors (n,) or (B, n)
     ) -> tuple[_Array, ...]:  # each (B, n) or (B,)
         """Computes the gradients of a function of many movements with respect to their conditions.
 
@@ -1330,9 +1334,9 @@ class Model:
         Raises
         ------
         ValueError
-            An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind
-            of primitive; a velocity or start of which there is none to differentiate by; tau with accelerations; or a
-            model with rotations.
+            An argument that `rollouts` rejects; movements that differ in tau, follow `segment_durations` or start at a
+            `phase`; cotangents of another shape, or not finite; a condition of the other kind of primitive; a velocity or
+            start of which there is none to differentiate by; tau with accelerations; or a model with rotations.
         TypeError
             As in `rollouts`.
 
@@ -1357,7 +1361,7 @@ class Model:
         context: _Context | _Contexts | None = None,
         derivatives: int = 1,
         threads: int | None = None,
-        **changes: Unpack[_Changes],
+        **changes: Unpack[_RowChanges],
     ) -> RolloutChunks:
         """Computes the movements of many conditions in chunks.
 
@@ -2112,7 +2116,7 @@ class Model:
         transition: float | None = None,
         context: _Context | _Contexts | None = None,
         out: Sequence[_Array] | None = None,  # three arrays (B, D)
-        **changes: Unpack[_Changes],  # one value, or rows (B, n)
+        **changes: Unpack[_RowChanges],  # one value, or rows (B, n)
     ) -> Controllers:
         """Starts many movements that are computed together, tick by tick.
 
@@ -2273,6 +2277,19 @@ class _Changes(TypedDict, total=False):
     tau: float | None
     segment_durations: ArrayLike | None  # (K,)
     phase: float | None
+    forcing: AdditionalForcing | None
+
+class _RowChanges(TypedDict, total=False):  # one value, or one for each of B movements
+    style: ArrayLike | None
+    goal: _Vector | None
+    start: _Vector | None
+    velocity: _Vector | None
+    goal_velocity: _Vector | None
+    anchor: _Vector | None
+    amplitude: ArrayLike | None  # () or (B,), as are tau and phase
+    tau: ArrayLike | None
+    segment_durations: ArrayLike | None
+    phase: ArrayLike | None
     forcing: AdditionalForcing | None
 
 @final

@@ -92,9 +92,9 @@ proptest! {
                 start: starts.clone(),
                 velocity: velocities.clone(),
                 goal_velocity: goal_velocities.clone(),
-                amplitude: Some(amplitude).filter(|_| !discrete),
-                tau,
-                forcing: None,
+                amplitude: (!discrete).then(|| amplitude.into()),
+                tau: tau.map(PerMovement::from),
+                ..BatchConditions::default()
             };
             let duration = length * factor * model.duration();
             let made = all(&conditions, model, grid(dt, duration));
@@ -106,7 +106,7 @@ proptest! {
                     start: row(&starts, b),
                     velocity: row(&velocities, b),
                     goal_velocity: row(&goal_velocities, b),
-                    amplitude: conditions.amplitude,
+                    amplitude: (!discrete).then_some(amplitude),
                     tau,
                     ..Conditions::default()
                 };
@@ -210,7 +210,7 @@ fn cached_responses_are_bitwise_equal_to_new_ones() {
     let styles = array![[0.4, -1.0], [0.0, 2.0]];
     for (model, other) in [(&*REACH, 0.7), (&*CYCLE, 1.3)] {
         let conditions = BatchConditions { style: one_each(styles.clone()), ..Default::default() };
-        let slower = BatchConditions { tau: Some(other), ..conditions.clone() };
+        let slower = BatchConditions { tau: Some(other.into()), ..conditions.clone() };
         let fresh = || Arc::new(Model::clone(model));
         let (expected, expected_slower) = [&conditions, &slower].map(|c| all(c, &fresh(), grid(0.01, 1.0))).into();
         let used = fresh();
@@ -353,28 +353,80 @@ fn a_batch_of_conditions_has_their_rollouts() {
     }
 }
 
-/// Conditions that one product cannot serve are refused by name: different time constants, phases and warped time, and a
-/// start velocity for some movements only.
+/// Movements of different τ or phase are rollouts to the bit, at the times of the longest; different amplitudes keep the
+/// response curves, and agree to rounding. Chunks and threads do not change them.
+#[test]
+fn movements_may_differ_in_timing_and_amplitude() {
+    for model in [&*REACH, &*CYCLE] {
+        let discrete = model.kind() == Kind::Discrete;
+        let taus: Vec<f64> = (0..20).map(|b| model.tau() * (0.5 + 0.07 * f64::from(b))).collect();
+        let of = |b: usize| Conditions {
+            style: Some(vec![0.1 * b as f64, -0.2]),
+            tau: Some(taus[b]),
+            phase: (!discrete).then_some(0.3 * b as f64),
+            amplitude: (!discrete).then_some(0.1 * b as f64),
+            ..Conditions::default()
+        };
+        let movements: Vec<_> = (0..20).map(of).collect();
+        let conditions = BatchConditions::each(model.primitive(), &movements).unwrap();
+        let (dt, duration) = (0.01, model.duration() * taus[19] / model.tau());
+        for length in [None, Some(0.7), Some(2.0 * duration)] {
+            let made = all(&conditions, model, TimeGrid { dt, duration: length });
+            let grid = TimeGrid { dt, duration: length.or(Some(duration)) };
+            let batch = batch(model.primitive(), conditions.clone(), grid, &mut |_| Ok(())).unwrap();
+            let threads = Threads::new(3).unwrap();
+            let part = batch.rollouts(7..20, Derivative::Velocity, threads, &mut |_| Ok(())).unwrap();
+            for (b, one) in movements.iter().enumerate() {
+                let single = rollout(model.primitive(), one, grid).unwrap();
+                assert_eq!(made.position.index_axis(Axis(0), b), single.position);
+                assert_eq!(made.velocity.as_ref().unwrap().index_axis(Axis(0), b), single.velocity);
+                assert_eq!(made.acceleration.as_ref().unwrap().index_axis(Axis(0), b), single.acceleration);
+                if b >= 7 {
+                    assert_eq!(part.position.index_axis(Axis(0), b - 7), single.position);
+                }
+            }
+        }
+    }
+    let amplitudes = [0.0, 0.5, 2.0].map(|amplitude| Conditions {
+        style: Some(vec![0.4, -0.2]),
+        amplitude: Some(amplitude),
+        ..Conditions::default()
+    });
+    let conditions = BatchConditions::each(CYCLE.primitive(), &amplitudes).unwrap();
+    let made = all(&conditions, &CYCLE, grid(0.01, 3.0));
+    for (b, one) in amplitudes.iter().enumerate() {
+        let single = rollout(CYCLE.primitive(), one, grid(0.01, 3.0)).unwrap();
+        let (error, largest) = difference(&made.position.index_axis(Axis(0), b).to_owned(), &single.position);
+        assert!(error <= 1e-12 * (1.0 + largest), "{error}");
+    }
+}
+
+/// Conditions that a batch cannot have are refused by name: a start velocity for some movements only, and a phase of a discrete
+/// movement. Time constants that are equal but for rounding keep the response curves; gradients need them.
 #[test]
 fn conditions_that_a_batch_cannot_share_are_refused() {
     let none = Conditions::default;
     let refused = |model: &Arc<Model>, conditions: &[Conditions]| {
-        let error = BatchConditions::each(model.primitive(), conditions).unwrap_err();
-        error.argument().map(str::to_string)
+        let conditions = BatchConditions::each(model.primitive(), conditions);
+        let made = conditions.and_then(|one| batch(model.primitive(), one, grid(0.01, 1.0), &mut |_| Ok(())));
+        made.unwrap_err().argument().map(str::to_string)
     };
-    let tau = |tau: f64| Conditions { tau: Some(tau), ..none() };
-    assert_eq!(refused(&REACH, &[tau(0.5), tau(0.6)]).as_deref(), Some("tau"));
-    assert_eq!(refused(&REACH, &[none(), tau(2.0 * REACH.tau())]).as_deref(), Some("tau"));
-    let equal = BatchConditions::each(REACH.primitive(), &[none(), tau(REACH.tau() * (1.0 + 1e-12))]);
-    assert_eq!(equal.unwrap().tau, Some(REACH.tau()));
-    let phase = Conditions { phase: Some(1.0), ..none() };
-    assert_eq!(refused(&CYCLE, &[phase]).as_deref(), Some("phase"));
     let velocity = Conditions { velocity: Some(vec![0.0; 3]), ..none() };
     assert_eq!(refused(&REACH, &[velocity, none()]).as_deref(), Some("velocity"));
+    let phase = Conditions { phase: Some(1.0), ..none() };
+    assert_eq!(refused(&REACH, &[phase, none()]).as_deref(), Some("phase"));
     let warped = Conditions { segment_durations: Some(vec![0.5, 0.5]), ..none() };
     assert_eq!(refused(&REACH, &[warped]).as_deref(), Some("segment_durations"));
-    let amplitude = |amplitude| Conditions { amplitude: Some(amplitude), ..none() };
-    assert_eq!(refused(&CYCLE, &[amplitude(0.5), none()]).as_deref(), Some("amplitude"));
+    let tau = |tau: f64| Conditions { tau: Some(tau), ..none() };
+    assert_eq!(refused(&REACH, &[tau(1.0), tau(-1.0)]).as_deref(), Some("tau"));
+    let gradient = |second: f64| {
+        let conditions = BatchConditions::each(REACH.primitive(), &[tau(REACH.tau()), tau(second)]).unwrap();
+        let batch = batch(REACH.primitive(), conditions, grid(0.01, 1.0), &mut |_| Ok(())).unwrap();
+        let cotangents = Array3::ones(batch.shape());
+        batch.vector_jacobian(0..2, &[WithRespectTo::Goal], &[cotangents.view()], Threads::ONE, &mut |_| Ok(()))
+    };
+    assert!(gradient(REACH.tau() * (1.0 + 1e-12)).is_ok());
+    assert_eq!(gradient(2.0 * REACH.tau()).unwrap_err().argument(), Some("conditions"));
 }
 
 /// Invalid conditions are rejected with the name of the argument and its numbers.
@@ -400,8 +452,8 @@ fn invalid_batches_are_rejected() {
             BatchConditions { anchor: Some(PerMovement::All(vec![0.0; 3])), ..valid() },
             "anchor does not apply to a discrete",
         ),
-        (BatchConditions { amplitude: Some(2.0), ..valid() }, "amplitude does not apply"),
-        (BatchConditions { tau: Some(-1.0), ..valid() }, "tau = -1"),
+        (BatchConditions { amplitude: Some(2.0.into()), ..valid() }, "amplitude does not apply"),
+        (BatchConditions { tau: Some((-1.0).into()), ..valid() }, "tau = -1"),
     ] {
         let found = error_of(&REACH, conditions);
         assert!(found.starts_with(message), "{found}");
@@ -426,7 +478,7 @@ fn extreme_batches_are_finite() {
             style: one_each(array![[1e100, -1e100], [0.0, 0.0]]),
             start: huge.clone(),
             velocity: huge,
-            amplitude: (model.kind() == Kind::Rhythmic).then_some(1e150),
+            amplitude: (model.kind() == Kind::Rhythmic).then(|| 1e150.into()),
             ..Default::default()
         };
         assert!(all(&conditions, model, grid(0.01, 2.0)).iter().flatten().all(|x| x.is_finite()));

@@ -49,8 +49,8 @@ fn condition(conditions: &BatchConditions, b: usize) -> Conditions {
         start: rows(&conditions.start, b),
         velocity: rows(&conditions.velocity, b),
         goal_velocity: rows(&conditions.goal_velocity, b),
-        amplitude: conditions.amplitude,
-        tau: conditions.tau,
+        amplitude: rows(&conditions.amplitude, b).map(|r| r[0]),
+        tau: rows(&conditions.tau, b).map(|tau| tau[0]),
         ..Conditions::default()
     }
 }
@@ -95,8 +95,8 @@ proptest! {
                 start: start.then(|| vectors(n_dofs, seed + 2)),
                 velocity: velocity.then(|| vectors(n_dofs, seed + 3)),
                 goal_velocity: (discrete && goal_velocity).then(|| vectors(n_dofs, seed + 4)),
-                amplitude: (!discrete).then_some(amplitude),
-                tau: Some(factor * model.tau()),
+                amplitude: (!discrete).then(|| amplitude.into()),
+                tau: Some((factor * model.tau()).into()),
                 ..BatchConditions::default()
             };
             let grid = grid(0.01, 0.01 * (samples - 1) as f64);

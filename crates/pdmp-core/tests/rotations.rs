@@ -375,6 +375,26 @@ fn batches_agree_with_rollouts() {
     }
 }
 
+/// Poses of a batch that differ in τ are rollouts to the bit.
+#[test]
+fn batches_of_different_tau_are_rollouts() {
+    let model = fitted(&demonstrations(&screws(6, 4.7, 0.5, 151, 3)), 3);
+    let of = |m: usize| {
+        let conditions = model.conditions(&[m]).unwrap();
+        let (velocity, tau) = (Some(vec![0.1 * m as f64; 6]), Some(0.8 + 0.2 * m as f64));
+        Conditions { velocity, segment_durations: None, tau, ..conditions }
+    };
+    let (conditions, grid) = ((0..6).map(of).collect::<Vec<_>>(), grid(0.01, 2.0));
+    let prepared = BatchConditions::each(model.primitive(), &conditions).unwrap();
+    let batch = batch(model.primitive(), prepared, grid, &mut |_| Ok(())).unwrap();
+    let all = batch.rollouts(0..6, Derivative::Velocity, Threads::ONE, &mut |_| Ok(())).unwrap();
+    for (m, conditions) in conditions.iter().enumerate() {
+        let single = rollout(model.primitive(), conditions, grid).unwrap();
+        assert_eq!(all.position.index_axis(ndarray::Axis(0), m), single.position);
+        assert_eq!(all.velocity.as_ref().unwrap().index_axis(ndarray::Axis(0), m), single.velocity);
+    }
+}
+
 /// Jacobians are the small rotations that small changes of the conditions cause, in the frame of the model.
 #[test]
 fn jacobians_are_derivatives_of_the_movement() {

@@ -8,11 +8,10 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use common::*;
-use ndarray::{Array2, array};
+use ndarray::{Array2, Axis, array};
 use pdmp_core::learning::{StyleOptions, TimeScaling, Truncation, style_of};
-use pdmp_core::model::TimeWarp;
-use pdmp_core::motion::TimeGrid;
-use pdmp_core::motion::jacobian;
+use pdmp_core::model::{Derivative, TimeWarp};
+use pdmp_core::motion::{BatchConditions, TimeGrid, batch, jacobian};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, Controller, Demonstration, Error, FitOptions, Kind, Model, Sampling, Status, fit};
@@ -452,5 +451,27 @@ fn invalid_timings_are_rejected() {
     assert!(model.tau_at(0.0, &[0.1; 8]).unwrap() > 0.0, "long after the end");
     for phase in [-0.1, 1.1, f64::NAN] {
         assert!(model.tau_at(phase, &[0.1; 8]).unwrap_err().to_string().contains("must lie in [0, 1] for a discrete"));
+    }
+}
+
+/// Movements of a batch that have segment durations of their own are rollouts in warped time, to the bit.
+#[test]
+fn batches_follow_the_segment_durations_of_each_movement() {
+    let demos: Vec<_> = [[1.0, 1.0], [1.3, 0.7], [0.8, 1.2]]
+        .iter()
+        .zip([0.8, 1.0, 1.2])
+        .map(|(slopes, a)| warped(Kind::Discrete, a, slopes, 2.0))
+        .collect();
+    let model = learn(&demos, &by_warp(Kind::Discrete));
+    let movements: Vec<_> = (0..3).map(|m| model.conditions(&[m]).unwrap()).collect();
+    let conditions = BatchConditions::each(model.primitive(), &movements).unwrap();
+    let grid = TimeGrid { dt: 0.01, duration: Some(2.5) };
+    let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(())).unwrap();
+    let made = batch.rollouts(0..3, Derivative::Velocity, Threads::ONE, &mut |_| Ok(())).unwrap();
+    for (b, one) in movements.iter().enumerate() {
+        assert!(one.segment_durations.as_ref().is_some_and(|durations| durations.len() > 1));
+        let single = rollout(model.primitive(), one, grid).unwrap();
+        assert_eq!(made.position.index_axis(Axis(0), b), single.position);
+        assert_eq!(made.velocity.as_ref().unwrap().index_axis(Axis(0), b), single.velocity);
     }
 }

@@ -26,15 +26,18 @@ impl Model {
     /// response curves. The model caches these for a few recent (dt, tau, duration). Results equal those of `rollout`
     /// to rounding.
     ///
-    /// All movements share time constant and amplitude; they follow linear time and start at phase 0.
+    /// Movements that differ in tau, follow `segment_durations`, or start at a `phase` have no response curves in
+    /// common: each then costs a rollout, which it equals to the bit. All are sampled at the same times. Without
+    /// `duration`, these reach to the end of the longest movement; the others continue past their end as in `rollout`,
+    /// discrete ones at rest on their goal.
     ///
     /// Parameters
     /// ----------
     /// conditions : Conditions, or B Conditions, optional
     ///     Conditions of all movements, or of each.
     /// context : array_like or list, (Q,) or (B, Q), optional
-    ///     Context of all movements, or of each, whose prediction supplies absent conditions. Pass `tau` where the
-    ///     predicted durations differ.
+    ///     Context of all movements, or of each, whose prediction supplies absent conditions, durations included. One
+    ///     `tau` for all keeps the response curves.
     /// dt : float
     ///     Interval between samples in s.
     /// duration : float, optional
@@ -46,8 +49,8 @@ impl Model {
     /// threads : int, optional
     ///     Largest number of threads; by default all that the system offers. Results do not depend on it.
     /// **changes
-    ///     Single conditions by name, which replace those of `conditions`; see `Conditions`. Style, goal, start,
-    ///     velocity, goal_velocity and anchor may have a leading axis, with one row for each of B movements.
+    ///     Single conditions by name, which replace those of `conditions`; see `Conditions`. All may have a leading axis
+    ///     with one entry for each of B movements: vectors (B, n), and tau, amplitude and phase (B,).
     ///
     /// Returns
     /// -------
@@ -58,7 +61,7 @@ impl Model {
     /// ------
     /// ValueError
     ///     An argument has a wrong shape, is not finite, belongs to the other kind of primitive, or `out` does not fit;
-    ///     leading axes, time constants or amplitudes differ. Nothing is written then.
+    ///     leading axes differ. Nothing is written then.
     /// TypeError
     ///     A keyword is unknown, or `conditions` has another type.
     /// MemoryError
@@ -69,6 +72,7 @@ impl Model {
     /// >>> positions, velocities = model.rollouts(style=model.styles, goal=model.goals, dt=0.1)
     /// >>> positions.shape
     /// (5, 13, 2)
+    /// >>> at_own_pace, _ = model.rollouts(style=model.styles, tau=[0.6, 0.8, 1.0, 1.2, 1.4], dt=0.1)
     #[pyo3(
         signature = (
             conditions=None, *, dt=Scalar::Number(0.01), duration=None, context=None, derivatives=Scalar::Count(1),

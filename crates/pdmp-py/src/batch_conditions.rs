@@ -6,7 +6,7 @@ use pdmp_core::model::Conditions as Inner;
 use pdmp_core::motion::{BatchConditions, PerMovement};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyString};
 
 use crate::conditions::{Conditions, changed, reject_style};
 use crate::convert::{array, items};
@@ -58,12 +58,21 @@ pub(crate) fn batch_conditions_of(
     };
     let mut made = made.map_err(raise)?;
     for (name, rows) in rows {
+        // A time constant and segment durations stand for each other.
+        match name.as_str() {
+            "tau" => made.segment_durations = None,
+            "segment_durations" => made.tau = None,
+            _ => {}
+        }
         if let Some(condition) = vectors(&mut made, &name) {
             *condition = Some(PerMovement::Each(rows));
         }
     }
     Ok(made)
 }
+
+/// Conditions that are numbers.
+const NUMBERS: [&str; 3] = ["amplitude", "tau", "phase"];
 
 /// Conditions by name, with one row for each movement (B, n).
 type Rows = Vec<(String, Array2<f64>)>;
@@ -73,17 +82,29 @@ fn split<'py>(py: Python<'py>, changes: Option<&Bound<'py, PyDict>>) -> PyResult
     let (common, mut each) = (PyDict::new(py), Vec::new());
     for (key, value) in changes.into_iter().flatten() {
         let name: String = key.extract()?;
-        if value.is_none() || vectors(&mut BatchConditions::default(), &name).is_none() {
+        let is_number = NUMBERS.contains(&name.as_str());
+        let is_one = is_number && (value.len().is_err() || value.is_instance_of::<PyString>());
+        if value.is_none() || is_one || vectors(&mut BatchConditions::default(), &name).is_none() {
             common.set_item(key, value)?;
             continue;
         }
         let rows = array(&name, &value)?;
-        match rows.ndim() {
+        let n = rows.len();
+        match rows.ndim() + usize::from(is_number) {
             1 => common.set_item(key, value)?,
+            2 if is_number => {
+                let column = rows.into_shape_with_order((n, 1));
+                each.push((name, column.map_err(|_| PyValueError::new_err("axes"))?));
+            }
             2 => each.push((name, rows.into_dimensionality::<Ix2>().map_err(|_| PyValueError::new_err("axes"))?)),
             _ => {
-                let n = if name == "style" { "J" } else { "D" };
-                let (shape, expected) = (rows.shape(), format!("expected ({n},) or (B, {n})"));
+                let expected = match name.as_str() {
+                    _ if is_number => "expected a number or (B,)",
+                    "style" => "expected (J,) or (B, J)",
+                    "segment_durations" => "expected (K,) or (B, K)",
+                    _ => "expected (D,) or (B, D)",
+                };
+                let shape = rows.shape();
                 return Err(PyValueError::new_err(format!("{name} has shape {shape:?}, {expected}")));
             }
         }
@@ -100,6 +121,10 @@ fn vectors<'a>(conditions: &'a mut BatchConditions, name: &str) -> Option<&'a mu
         "velocity" => Some(&mut conditions.velocity),
         "goal_velocity" => Some(&mut conditions.goal_velocity),
         "anchor" => Some(&mut conditions.anchor),
+        "amplitude" => Some(&mut conditions.amplitude),
+        "tau" => Some(&mut conditions.tau),
+        "segment_durations" => Some(&mut conditions.segment_durations),
+        "phase" => Some(&mut conditions.phase),
         _ => None,
     }
 }

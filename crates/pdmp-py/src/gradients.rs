@@ -61,9 +61,9 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind
-    ///     of primitive; a velocity or start of which there is none to differentiate by; tau with accelerations; or a
-    ///     model with rotations.
+    ///     An argument that `rollouts` rejects; movements that differ in tau, follow `segment_durations` or start at a
+    ///     `phase`; cotangents of another shape, or not finite; a condition of the other kind of primitive; a velocity or
+    ///     start of which there is none to differentiate by; tau with accelerations; or a model with rotations.
     /// TypeError
     ///     As in `rollouts`.
     ///

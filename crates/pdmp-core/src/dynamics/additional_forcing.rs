@@ -79,7 +79,7 @@ impl Table {
         }
         let (t, scale) = (position - cell as f64, self.cells_per_clock);
         let [a, b, c, d, e, f] = &self.quintics[cell * (self.quintics.len() / self.cells) + group];
-        let [a, b, c, d, e, f] = [a, b, c, d, e, f].map(T::load);
+        let [a, b, c, d, e, f] = T::load_all([a, b, c, d, e, f]);
         FrameSample {
             value: a + (b + (c + (d + (e + f * t) * t) * t) * t) * t,
             slope: (b + (c * 2.0 + (d * 3.0 + (e * 4.0 + f * (5.0 * t)) * t) * t) * t) * scale,

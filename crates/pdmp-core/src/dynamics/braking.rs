@@ -10,7 +10,8 @@
 //! decelerates equally but leaves a displacement that decays at the rate α_z/2 for every κ. From
 //! z = −α_zβ_z·h(v), h(v) = ∫₀ᵛ exp(−α_z(v − s))·s·exp(−λs) ds, and e′ = z + p, the forcing is p = (1 − λv)·exp(−λv) + α_zβ_z·h.
 
-use crate::dynamics::output_system::{Attractor, INVERSE_FACTORIAL, State};
+use crate::dynamics::output_system::{Attractor, CubicSample, INVERSE_FACTORIAL, State};
+use crate::numerics::simd::F64x4;
 
 /// Maximum |x| of the series of ψ; the closed form loses a digit here, and more below.
 const MAX_SERIES: f64 = 0.5;
@@ -81,6 +82,31 @@ fn psi(x: f64, exp: f64) -> f64 {
     }
     let terms = INVERSE_FACTORIAL[2..16].iter().rev().zip((1..15).rev());
     terms.fold(0.0, |sum, (inverse, k)| sum * x + f64::from(k) * inverse)
+}
+
+/// Motion past the end due to the forcing w = r·(a + b·p) of a movement that brakes: e = b·e₁ and z = b·z₁ − a·r solve
+/// e′ = z + w about the goal.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BrakedMotion {
+    pub(super) r: f64,
+    pub(super) p: f64,
+    /// e₁ and z₁.
+    pub(super) unit: State<f64>,
+    /// Maximum of e₁ from the clock on.
+    pub(super) max_displacement: f64,
+}
+
+impl BrakedMotion {
+    /// Returns the state for a + b·p as value and b as slope.
+    pub(crate) fn state(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> State<F64x4> {
+        let a = value - slope * self.p;
+        State { e: slope * self.unit.e, z: slope * self.unit.z - a * self.r }
+    }
+
+    /// Returns the maximum of |e| from the clock on.
+    pub(crate) fn max_displacement(&self, slope: F64x4) -> F64x4 {
+        slope.abs() * self.max_displacement
+    }
 }
 
 #[cfg(test)]

@@ -3,10 +3,10 @@
 //! The forcing of each style dimension and DoF is stored as a piecewise cubic Hermite interpolant on a uniform grid of the
 //! clock, independently of the regressor that it was learnt by.
 
-use crate::dynamics::braking::Braking;
+use crate::dynamics::braking::{BrakedMotion, Braking};
 use crate::dynamics::canonical::{Canonical, faded, turn};
 use crate::dynamics::hermite_table::KnotTable;
-use crate::dynamics::output_system::{Attractor, CubicSample, State};
+use crate::dynamics::output_system::{Attractor, CubicSample};
 use crate::numerics::simd::{F64x4, Real, Register, WIDTH, groups};
 
 /// Forcing w of unit styles over the clock: x·b(x; W) for a discrete movement, b(φ; W) for a rhythmic one.
@@ -65,31 +65,6 @@ pub(crate) struct Fade {
     pub(crate) p_slope: f64,
 }
 
-/// Motion past the end due to the forcing w = r·(a + b·p) of a movement that brakes: e = b·e₁ and z = b·z₁ − a·r solve
-/// e′ = z + w about the goal.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BrakedMotion {
-    r: f64,
-    p: f64,
-    /// e₁ and z₁.
-    unit: State<f64>,
-    /// Maximum of e₁ from the clock on.
-    max_displacement: f64,
-}
-
-impl BrakedMotion {
-    /// Returns the state for a + b·p as value and b as slope.
-    pub(crate) fn state(&self, CubicSample { value, slope }: CubicSample<F64x4>) -> State<F64x4> {
-        let a = value - slope * self.p;
-        State { e: slope * self.unit.e, z: slope * self.unit.z - a * self.r }
-    }
-
-    /// Returns the maximum of |e| from the clock on.
-    pub(crate) fn max_displacement(&self, slope: F64x4) -> F64x4 {
-        slope.abs() * self.max_displacement
-    }
-}
-
 /// Upper bound of |w|, without the part that decays as z does, from a clock past the end on: of a + b·p and of b.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ForcingBound {
@@ -111,10 +86,18 @@ struct Cubic([F64x4; 4]);
 
 /// Position in the table: the index of the first cubic at a knot, and the argument of the cubics: the clock since that knot,
 /// or p past the end.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TableIndex {
     first: usize,
     pub(crate) t: f64,
+}
+
+impl TableIndex {
+    /// Returns whether both lie in one cell.
+    #[inline(always)]
+    pub(crate) fn is_in_cell_of(self, other: Self) -> bool {
+        self.first == other.first
+    }
 }
 
 impl Cubic {
@@ -346,14 +329,19 @@ impl ForcingTable {
 
     /// Prefetches the cubics at clock `u`, since a table may exceed the first-level cache.
     #[inline(always)]
-    #[allow(unsafe_code)]
     pub(crate) fn prefetch(&self, u: f64) {
+        self.prefetch_at(self.demonstrated_index(u));
+    }
+
+    /// Prefetches the cubics at a position.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub(crate) fn prefetch_at(&self, index: TableIndex) {
         #[cfg(target_arch = "x86_64")]
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
-            let start = self.demonstrated_index(u).first;
-            for Cubic([first, _, third, _]) in &self.cubics[start..start + self.knot_stride] {
+            for Cubic([first, _, third, _]) in &self.cubics[index.first..index.first + self.knot_stride] {
                 // SAFETY: SSE is part of x86-64, and a prefetch is a hint that never faults and reads no value. The
                 // addresses are those of elements of `cubics`.
                 unsafe {
@@ -366,16 +354,21 @@ impl ForcingTable {
 
     /// Returns the forcing Σⱼ sⱼwⱼ of a style and its slope, for one group of DoFs.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // See `Kernel`.
     pub(crate) fn sample<T: Register>(&self, index: TableIndex, group: usize, style: &[f64]) -> CubicSample<T> {
-        let mut sum = [T::default(); 4];
-        for (s, cubic) in style.iter().zip(self.cubics(index.first, group)) {
-            accumulate(&mut sum, cubic.load(), *s);
+        let cubics = self.cubics(index.first, group);
+        let ([s, style @ ..], [cubic, cubics @ ..]) = (style, cubics) else { return CubicSample::default() };
+        let [value, slope, square, cube] = cubic.load::<T>();
+        let mut sum = [value * *s, slope * *s, square * *s, cube * *s];
+        for j in 0..style.len().min(cubics.len()) {
+            accumulate(&mut sum, cubics[j].load(), style[j]);
         }
         evaluate(sum, index.t)
     }
 
     /// Returns the forcings of two styles. Each cubic is loaded once for both.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // See `Kernel`.
     pub(crate) fn sample_pair<T: Register>(
         &self,
         index: TableIndex,
@@ -383,18 +376,20 @@ impl ForcingTable {
         styles: [&[f64]; 2],
     ) -> [CubicSample<T>; 2] {
         let mut sums = [[T::default(); 4]; 2];
-        for ((s, v), cubic) in styles[0].iter().zip(styles[1]).zip(self.cubics(index.first, group)) {
-            let cubic = cubic.load();
-            accumulate(&mut sums[0], cubic, *s);
-            accumulate(&mut sums[1], cubic, *v);
+        let ([style, rate], cubics) = (styles, self.cubics(index.first, group));
+        for j in 0..cubics.len().min(style.len()).min(rate.len()) {
+            let cubic = cubics[j].load();
+            accumulate(&mut sums[0], cubic, style[j]);
+            accumulate(&mut sums[1], cubic, rate[j]);
         }
         [evaluate(sums[0], index.t), evaluate(sums[1], index.t)]
     }
 }
 
 #[inline(always)]
+#[allow(clippy::needless_range_loop)] // See `Kernel`.
 fn accumulate<T: Real>(sum: &mut [T; 4], cubic: [T; 4], weight: f64) {
-    for (sum, coefficient) in sum.iter_mut().zip(cubic) {
-        *sum = *sum + coefficient * weight;
+    for i in 0..4 {
+        sum[i] = sum[i] + cubic[i] * weight;
     }
 }

@@ -156,7 +156,7 @@ impl GoalTransition {
         let scale = 1.0 / (self.to - self.from);
         let s = ((u - self.from) * scale).clamp(0.0, 1.0);
         let [a, b, c, d, e, f] = &self.coefficients[group];
-        let [a, b, c, d, e, f] = [a, b, c, d, e, f].map(T::load);
+        let [a, b, c, d, e, f] = T::load_all([a, b, c, d, e, f]);
         let value = a + (b + (c + (d + (e + f * s) * s) * s) * s) * s;
         let slope = b + (c * 2.0 + (d * 3.0 + (e * 4.0 + f * (5.0 * s)) * s) * s) * s;
         let bend = c * 2.0 + (d * 6.0 + (e * 12.0 + f * (20.0 * s)) * s) * s;

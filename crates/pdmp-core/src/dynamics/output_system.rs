@@ -185,18 +185,17 @@ impl Propagator {
     /// Returns the state after the step under the forcing w.
     #[inline(always)]
     pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [CubicSample<T>; 2]) -> State<T> {
-        let [e, z] = [0, 1].map(|row| {
-            let [from_e, from_z] = self.transition[row];
-            (state.e * from_e + state.z * from_z) + hermite_dot(&self.forcing[row], forcing)
-        });
-        State { e, z }
+        let [[ee, ez], [ze, zz]] = self.transition;
+        State {
+            e: (state.e * ee + state.z * ez) + hermite_dot(&self.forcing[0], forcing),
+            z: (state.e * ze + state.z * zz) + hermite_dot(&self.forcing[1], forcing),
+        }
     }
 
     /// Returns the response of the state to the displacement γ of the goal, relative to the goal at the start of the step.
     #[inline(always)]
     pub(crate) fn follow<T: Real>(&self, goal: [CubicSample<T>; 2]) -> State<T> {
-        let [e, z] = [0, 1].map(|row| hermite_dot(&self.goal[row], goal));
-        State { e, z }
+        State { e: hermite_dot(&self.goal[0], goal), z: hermite_dot(&self.goal[1], goal) }
     }
 }
 

@@ -11,7 +11,7 @@
 //! faster than scaling and squaring, and as accurate.
 
 use crate::dynamics::output_system::{Attractor, Propagator};
-use crate::numerics::simd::{F64x4, Register};
+use crate::numerics::simd::{F64x4, Register, WIDTH};
 use crate::numerics::state::clone_in_place;
 
 /// Truncation error of the series, relative to its value.
@@ -99,8 +99,11 @@ impl Series {
                 *sum = [sum[0] * square + T::load(even), sum[1] * square + T::load(odd)];
             }
         }
-        let [forcing_e, forcing_z, goal_e, goal_z, [ee, ez, ze, zz]] =
-            sums.map(|[even, odd]| (even + odd * h).store().to_array());
+        let mut rows = [[0.0; WIDTH]; GROUPS];
+        for (row, [even, odd]) in rows.iter_mut().zip(sums) {
+            *row = (even + odd * h).store().to_array();
+        }
+        let [forcing_e, forcing_z, goal_e, goal_z, [ee, ez, ze, zz]] = rows;
         Propagator { h, transition: [[ee, ez], [ze, zz]], forcing: [forcing_e, forcing_z], goal: [goal_e, goal_z] }
     }
 }

@@ -134,6 +134,20 @@ impl Transport {
         }
     }
 
+    /// Returns the lag ℓ at clock `u`, which has not passed the cell `cell` or has passed on from it to another, which `cell`
+    /// then is.
+    #[inline(always)]
+    pub(crate) fn lag_from(&self, cell: &mut u16, u: f64) -> TransportSample {
+        let at = usize::from(*cell);
+        let Some(cubic) = self.cubics.get(at) else { return TransportSample::default() };
+        if u < self.width * (at + 1) as f64 {
+            return sample(cubic, u - self.width * at as f64);
+        }
+        let segment = self.segment_at(u);
+        *cell = self.cell(&segment) as u16;
+        segment.lag(u)
+    }
+
     /// Returns the lag ℓ at clock `u`.
     pub(crate) fn lag(&self, u: f64) -> TransportSample {
         self.segment_at(u).lag(u)
@@ -150,14 +164,19 @@ impl TransportSegment {
     /// Returns the lag ℓ at clock `u`.
     #[inline(always)]
     pub(crate) fn lag(&self, u: f64) -> TransportSample {
-        let ([value, slope, square, cube], t) = (self.cubic, u - self.from);
-        let rest = cube * t;
-        let bend = square + rest;
-        let twice = bend + bend;
-        TransportSample {
-            value: value + t * (slope + t * bend),
-            slope: slope + t * (twice + rest),
-            bend: twice + 4.0 * rest,
-        }
+        sample(&self.cubic, u - self.from)
+    }
+}
+
+/// Evaluates a cubic and its derivatives.
+#[inline(always)]
+fn sample([value, slope, square, cube]: &[f64; 4], t: f64) -> TransportSample {
+    let rest = cube * t;
+    let bend = square + rest;
+    let twice = bend + bend;
+    TransportSample {
+        value: value + t * (slope + t * bend),
+        slope: slope + t * (twice + rest),
+        bend: twice + 4.0 * rest,
     }
 }

@@ -85,6 +85,12 @@ impl Responses {
         extended
     }
 
+    /// Returns responses without samples.
+    pub(crate) fn none() -> Self {
+        let none = || Array2::zeros((0, 0));
+        Self([(); 3].map(|()| Curves { styles: Vec::new(), start: none(), velocity: none(), goal_velocity: None }))
+    }
+
     fn bytes(&self) -> usize {
         self.0.iter().map(|curves| (curves.styles.len() + 3) * curves.start.len() * size_of::<f64>()).sum()
     }

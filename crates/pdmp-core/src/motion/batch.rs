@@ -11,6 +11,7 @@ use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::batch_conditions::{BatchConditions, PerMovement};
+use crate::motion::batch_singles::Singles;
 use crate::motion::rollout::TimeGrid;
 use crate::motion::superposition::{self, Combination};
 use crate::motion::trajectory::Trajectories;
@@ -58,7 +59,8 @@ pub struct Batch {
     pub(super) starts: Option<PerMovement>,
     pub(super) velocities: Option<PerMovement>,
     pub(super) goal_velocities: Option<PerMovement>,
-    pub(super) amplitude: f64,
+    /// Amplitudes r₀ (1,).
+    pub(super) amplitudes: PerMovement,
     /// True if the last curves of the responses are the displacement by an additional forcing.
     is_forced: bool,
     pub(super) tau: f64,
@@ -66,9 +68,17 @@ pub struct Batch {
     pub(super) dt: f64,
     /// Primitive with rotations.
     pub(super) pose: Option<Arc<Primitive>>,
+    /// Movements of different timings, which share no responses; those of the batch are then empty.
+    pub(super) singles: Option<Singles>,
+    n_samples: usize,
+    n_dofs: usize,
 }
 
 /// Checks the conditions of a batch and computes the unit responses, unless the primitive has them in its cache.
+///
+/// Movements that differ in τ, follow segment durations, or start at a phase have no response curves in common: each is
+/// then a [`crate::rollout`], to the bit. All are sampled at the same times, without a duration up to that of the longest
+/// movement; the others continue past their end as a rollout does, discrete ones at rest on their goal.
 ///
 /// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
 ///
@@ -81,18 +91,33 @@ pub fn batch(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Batch> {
     let (outside, primitive) = (primitive, primitive.inside());
-    let conditions = match outside.coordinates() {
-        Some(coordinates) => conditions.in_dofs(coordinates)?,
-        None => conditions,
+    let coordinates = outside.coordinates();
+    let in_dofs = coordinates.map(|coordinates| conditions.clone().in_dofs(coordinates)).transpose()?;
+    let checked = in_dofs.as_ref().unwrap_or(&conditions);
+    let (n_movements, tau) = (checked.check(primitive)?, checked.common_tau(primitive)?);
+    let singles = match tau {
+        Some(_) => None,
+        None => Some(Singles::new(outside, conditions.movements(n_movements), grid)?),
     };
-    let n_movements = conditions.check(primitive)?;
-    let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, tau, forcing } = conditions;
-    let nominal = Conditions { amplitude, tau, ..Conditions::default() }.complete(primitive)?;
-    let mut responses = responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?;
-    if let Some(forcing) = &forcing {
-        responses = Arc::new(responses.with_forcing(forcing, grid.dt / nominal.tau, 1.0 / nominal.tau));
-    }
+    let conditions = in_dofs.unwrap_or(conditions);
+    let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, forcing, .. } = conditions;
+    let nominal = Conditions { tau, ..Conditions::default() }.complete(primitive)?;
+    let n_samples = match &singles {
+        Some(singles) => singles.n_samples()?,
+        None => grid.steps(primitive, nominal.tau)? + 1,
+    };
+    let responses = match (&singles, &forcing) {
+        (Some(_), _) => Arc::new(Responses::none()),
+        (None, None) => responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?,
+        (None, Some(forcing)) => {
+            let responses = responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?;
+            Arc::new(responses.with_forcing(forcing, grid.dt / nominal.tau, 1.0 / nominal.tau))
+        }
+    };
     Ok(Batch {
+        singles,
+        n_samples,
+        n_dofs: primitive.n_dofs(),
         responses,
         is_forced: forcing.is_some(),
         n_movements,
@@ -102,7 +127,7 @@ pub fn batch(
         starts: start.or(nominal.start.map(PerMovement::All)),
         velocities: velocity,
         goal_velocities: goal_velocity,
-        amplitude: nominal.amplitude,
+        amplitudes: amplitude.unwrap_or(PerMovement::All(vec![nominal.amplitude])),
         tau: nominal.tau,
         dt: grid.dt,
         pose: outside.coordinates().is_some().then(|| Arc::clone(outside)),
@@ -112,8 +137,7 @@ pub fn batch(
 impl Batch {
     /// Returns the numbers of movements B, samples T and degrees of freedom D.
     pub fn shape(&self) -> (usize, usize, usize) {
-        let (n_samples, n_dofs) = self.responses.of(Derivative::Position).start.dim();
-        (self.n_movements, n_samples, n_dofs)
+        (self.n_movements, self.n_samples, self.n_dofs)
     }
 
     /// Returns the number of style parameters.
@@ -242,9 +266,12 @@ impl Batch {
             let next: Vec<_> = blocks.by_ref().take(PROGRESS_INTERVAL * threads.get()).collect();
             let Some((first, _)) = next.first() else { return Ok(()) };
             progress((first - movements.start) as f64 / movements.len() as f64)?;
-            threads.try_for_each(next, |(first, outputs)| {
-                self.write_block(first, outputs);
-                Ok(())
+            threads.try_for_each(next, |(first, mut outputs)| match &self.singles {
+                Some(singles) => singles.write(first, &mut outputs),
+                None => {
+                    self.write_block(first, outputs);
+                    Ok(())
+                }
             })?;
         }
     }
@@ -287,7 +314,8 @@ impl Batch {
     /// Returns the coefficients of movement `b`.
     pub(super) fn combination(&self, b: usize) -> Combination {
         let displacement = self.is_forced.then_some(1.0);
-        let style: Vec<f64> = self.styles.row(b).iter().map(|s| self.amplitude * s).chain(displacement).collect();
+        let amplitude = self.amplitudes.row(b)[0];
+        let style: Vec<f64> = self.styles.row(b).iter().map(|s| amplitude * s).chain(displacement).collect();
         let centre = self.centres.row(b).to_vec();
         // Difference of a condition from its value at the start of the sum of the styles.
         let difference = |condition: &Option<PerMovement>, derivative: Derivative, centre: &[f64]| match condition {

@@ -8,7 +8,9 @@ use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::Coordinates;
-use crate::model::conditions::{Conditions, MAX_STYLE_MAGNITUDE, check_style, reject_for_kind, reject_goal_velocity};
+use crate::model::conditions::{
+    Conditions, MAX_STYLE_MAGNITUDE, check_amplitude, check_phase, check_style, reject_for_kind, reject_goal_velocity,
+};
 use crate::model::primitive::Primitive;
 use crate::validate::{check_matrix, check_vector, zeros};
 
@@ -42,10 +44,14 @@ pub struct BatchConditions {
     pub velocity: Option<PerMovement>,
     /// Final velocities (D,) of discrete movements, per second. The default is the velocity of the demonstrated movement.
     pub goal_velocity: Option<PerMovement>,
-    /// Common amplitude r₀ of rhythmic movements. The default is 1.
-    pub amplitude: Option<f64>,
-    /// Common time constant τ, in seconds.
-    pub tau: Option<f64>,
+    /// Amplitudes r₀ (1,) of rhythmic movements. The default is 1.
+    pub amplitude: Option<PerMovement>,
+    /// Time constants τ (1,), in seconds. Different ones cost a rollout of each movement.
+    pub tau: Option<PerMovement>,
+    /// Times in the segments of the movement (K,), in seconds, in place of τ. They cost a rollout of each movement.
+    pub segment_durations: Option<PerMovement>,
+    /// Phases φ (1,) at which rhythmic movements start, in rad. They cost a rollout of each movement.
+    pub phase: Option<PerMovement>,
     /// Common additional forcing. The default is none.
     pub forcing: Option<Arc<AdditionalForcing>>,
 }
@@ -67,11 +73,13 @@ impl BatchConditions {
     /// ```
     ///
     /// # Errors
-    /// A phase other than 0, or durations of several segments.
+    /// A τ together with segment durations, or durations that do not fit the primitive.
     pub fn shared(primitive: &Primitive, conditions: Conditions) -> Result<Self> {
-        let tau = time_constant(primitive, &conditions)?;
-        let Conditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, forcing, .. } = conditions;
+        conditions.time_constant(primitive)?;
+        let Conditions { style, goal, anchor, start, velocity, goal_velocity, .. } = conditions;
+        let Conditions { amplitude, tau, segment_durations, phase, forcing, .. } = conditions;
         let all = |vector: Option<Vec<f64>>| vector.map(PerMovement::All);
+        let number = |number: Option<f64>| number.map(PerMovement::from);
         Ok(Self {
             style: all(style),
             goal: all(goal),
@@ -79,8 +87,10 @@ impl BatchConditions {
             start: all(start),
             velocity: all(velocity),
             goal_velocity: all(goal_velocity),
-            amplitude,
-            tau,
+            amplitude: number(amplitude),
+            tau: number(tau),
+            segment_durations: all(segment_durations),
+            phase: number(phase),
             forcing,
         })
     }
@@ -102,8 +112,8 @@ impl BatchConditions {
     /// ```
     ///
     /// # Errors
-    /// As for [`BatchConditions::shared`]; vectors of a wrong length; velocities, or starts of rhythmic movements, that only
-    /// some of the conditions have; time constants or amplitudes that differ.
+    /// As for [`BatchConditions::shared`]; vectors of a wrong length; velocities, segment durations of several segments, or
+    /// starts of rhythmic movements, that only some of the conditions have; additional forcings that differ.
     pub fn each(primitive: &Primitive, conditions: &[Conditions]) -> Result<Self> {
         let nominal = Conditions::default().complete(primitive)?;
         let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
@@ -128,8 +138,15 @@ impl BatchConditions {
             let given = conditions.iter().any(|one| of(one).is_some());
             if given { rows(name, size, default, of) } else { Ok(None) }
         };
-        let taus = conditions.iter().map(|one| time_constant(primitive, one)).collect::<Result<Vec<_>>>()?;
-        let amplitudes: Vec<_> = conditions.iter().map(|one| one.amplitude).collect();
+        let taus = conditions.iter().map(|one| one.time_constant(primitive)).collect::<Result<Vec<_>>>()?;
+        let is_warped = conditions.iter().any(|one| one.segment_durations.as_ref().is_some_and(|all| all.len() > 1));
+        let is_paced = conditions.iter().any(|one| one.tau.is_some() || one.segment_durations.is_some());
+        let n_segments = conditions.iter().find_map(|one| one.segment_durations.as_ref()).map_or(1, Vec::len);
+        let numbers = |given: bool, of: &dyn Fn(usize) -> f64| {
+            given.then(|| PerMovement::Each(Array2::from_shape_fn((conditions.len(), 1), |(b, _)| of(b))))
+        };
+        let has_amplitude = conditions.iter().any(|one| one.amplitude.is_some());
+        let has_phase = conditions.iter().any(|one| one.phase.is_some());
         Ok(Self {
             style: rows("style", (n_styles, "style dimension"), Some(&nominal.style), |one| &one.style)?,
             goal: optional("goal", position, goal.as_deref(), |one| &one.goal)?,
@@ -137,8 +154,13 @@ impl BatchConditions {
             start: optional("start", position, start.as_deref(), |one| &one.start)?,
             velocity: optional("velocity", (n_dofs, "DoF"), None, |one| &one.velocity)?,
             goal_velocity: optional("goal_velocity", (n_dofs, "DoF"), None, |one| &one.goal_velocity)?,
-            amplitude: common("amplitude", &amplitudes, 1.0)?,
-            tau: common("tau", &taus, primitive.tau)?,
+            amplitude: numbers(has_amplitude, &|b| conditions[b].amplitude.unwrap_or(1.0)),
+            tau: numbers(is_paced && !is_warped, &|b| taus[b]),
+            segment_durations: match is_warped {
+                true => rows("segment_durations", (n_segments, "segment"), None, |one| &one.segment_durations)?,
+                false => None,
+            },
+            phase: numbers(has_phase, &|b| conditions[b].phase.unwrap_or(0.0)),
             forcing: common_forcing(conditions)?,
         })
     }
@@ -148,10 +170,9 @@ impl BatchConditions {
     /// # Errors
     /// Vectors that do not fit the coordinates, or different numbers of movements.
     pub(crate) fn in_dofs(mut self, coordinates: &Coordinates) -> Result<Self> {
-        let names = ["goal", "anchor", "start", "velocity", "goal_velocity"];
         let given = [&self.goal, &self.anchor, &self.start, &self.velocity, &self.goal_velocity];
         let mut n_movements = None;
-        for (name, rows) in names.into_iter().zip(given) {
+        for (name, rows) in self.named() {
             if let Some(PerMovement::Each(rows)) = rows {
                 let (found, expected) = (rows.nrows(), *n_movements.get_or_insert(rows.nrows()));
                 if found != expected {
@@ -164,8 +185,9 @@ impl BatchConditions {
         for b in 0..n_movements.unwrap_or(1) {
             let [goal, anchor, start, velocity, goal_velocity] =
                 given.map(|rows| rows.as_ref().map(|rows| rows.row(b).to_vec()));
-            let tau = self.tau;
-            let one = Conditions { goal, anchor, start, velocity, goal_velocity, tau, ..Conditions::default() };
+            let Conditions { tau, segment_durations, .. } = self.timing(b);
+            let vectors = Conditions { goal, anchor, start, velocity, goal_velocity, ..Conditions::default() };
+            let one = Conditions { tau, segment_durations, ..vectors };
             let one = coordinates.constant_in_dofs(&one)?;
             let vectors = [one.goal, one.anchor, one.start, one.velocity, one.goal_velocity];
             for (rows, vector) in converted.iter_mut().zip(vectors) {
@@ -199,33 +221,115 @@ impl BatchConditions {
         if let Some(forcing) = &self.forcing {
             forcing.check(primitive.canonical(), n_dofs)?;
         }
-        let vectors = [
+        let size = |name: &str, found: usize| match name {
+            "amplitude" | "tau" | "phase" => (1, "movement"),
+            // The time constant below refuses a wrong number of them.
+            "segment_durations" => (found, "segment"),
+            _ => (n_dofs, "DoF"),
+        };
+        let mut n_movements = None;
+        for (name, vectors) in self.named() {
+            match vectors {
+                None => {}
+                Some(PerMovement::All(style)) if name == "style" => check_style(style, primitive.n_styles())?,
+                Some(PerMovement::All(vector)) => {
+                    let (n, per) = size(name, vector.len());
+                    check_vector(name, vector, n, per)?;
+                }
+                Some(PerMovement::Each(rows)) => {
+                    let (found, expected) = (rows.nrows(), *n_movements.get_or_insert(rows.nrows()));
+                    if found != expected {
+                        return Err(Error::Rows { name, expected, found });
+                    }
+                    let (n, per) = size(name, rows.ncols());
+                    match name {
+                        "style" => check_styles(rows, primitive.n_styles())?,
+                        _ => check_rows(name, rows, n, per)?,
+                    }
+                }
+            }
+        }
+        let n_movements = n_movements.unwrap_or(1);
+        for b in 0..n_movements {
+            let one = self.timing(b);
+            reject_for_kind(kind, "amplitude", kind == Kind::Discrete && one.amplitude.is_some())?;
+            one.amplitude.map_or(Ok(()), check_amplitude)?;
+            one.phase.map_or(Ok(()), |phase| check_phase(kind, phase))?;
+            one.time_constant(primitive)?;
+        }
+        Ok(n_movements)
+    }
+
+    /// Returns the conditions that may differ between the movements, by name.
+    fn named(&self) -> [(&'static str, &Option<PerMovement>); 10] {
+        [
             ("style", &self.style),
             ("goal", &self.goal),
             ("anchor", &self.anchor),
             ("start", &self.start),
             ("velocity", &self.velocity),
             ("goal_velocity", &self.goal_velocity),
-        ];
-        let mut n_movements = None;
-        for (name, vectors) in vectors {
-            match vectors {
-                None => {}
-                Some(PerMovement::All(style)) if name == "style" => check_style(style, primitive.n_styles())?,
-                Some(PerMovement::All(vector)) => check_vector(name, vector, n_dofs, "DoF")?,
-                Some(PerMovement::Each(rows)) => {
-                    let (found, expected) = (rows.nrows(), *n_movements.get_or_insert(rows.nrows()));
-                    if found != expected {
-                        return Err(Error::Rows { name, expected, found });
-                    }
-                    match name {
-                        "style" => check_styles(rows, primitive.n_styles())?,
-                        _ => check_rows(name, rows, n_dofs, "DoF")?,
-                    }
-                }
+            ("amplitude", &self.amplitude),
+            ("tau", &self.tau),
+            ("segment_durations", &self.segment_durations),
+            ("phase", &self.phase),
+        ]
+    }
+
+    /// Returns amplitude, time constant or segment durations, and phase of movement `b`.
+    fn timing(&self, b: usize) -> Conditions {
+        let vector = |rows: &Option<PerMovement>| rows.as_ref().map(|rows| rows.row(b).to_vec());
+        let number = |rows: &Option<PerMovement>| rows.as_ref().map(|rows| rows.row(b)[0]);
+        Conditions {
+            amplitude: number(&self.amplitude),
+            tau: number(&self.tau),
+            segment_durations: vector(&self.segment_durations),
+            phase: number(&self.phase),
+            ..Conditions::default()
+        }
+    }
+
+    /// Returns the conditions of `n` movements.
+    pub(super) fn movements(&self, n: usize) -> Vec<Conditions> {
+        let vector = |rows: &Option<PerMovement>, b: usize| rows.as_ref().map(|rows| rows.row(b).to_vec());
+        let of = |b: usize| Conditions {
+            style: vector(&self.style, b),
+            goal: vector(&self.goal, b),
+            anchor: vector(&self.anchor, b),
+            start: vector(&self.start, b),
+            velocity: vector(&self.velocity, b),
+            goal_velocity: vector(&self.goal_velocity, b),
+            forcing: self.forcing.clone(),
+            ..self.timing(b)
+        };
+        (0..n).map(of).collect()
+    }
+
+    /// Returns the τ of all movements, which then have response curves in common: linear time from phase 0.
+    pub(super) fn common_tau(&self, primitive: &Primitive) -> Result<Option<f64>> {
+        let n_movements = self.named().iter().find_map(|(_, vectors)| match vectors {
+            Some(PerMovement::Each(rows)) => Some(rows.nrows()),
+            _ => None,
+        });
+        let mut common = None;
+        for b in 0..n_movements.unwrap_or(1) {
+            let one = self.timing(b);
+            let is_warped = one.segment_durations.as_ref().is_some_and(|durations| durations.len() > 1);
+            let tau = one.time_constant(primitive)?;
+            let first = *common.get_or_insert(tau);
+            if is_warped || one.phase.is_some_and(|phase| phase != 0.0) || (tau - first).abs() > MAX_DIFFERENCE * first
+            {
+                return Ok(None);
             }
         }
-        Ok(n_movements.unwrap_or(1))
+        Ok(Some(common.unwrap_or(primitive.tau)))
+    }
+}
+
+impl From<f64> for PerMovement {
+    /// Returns a number that all movements have.
+    fn from(number: f64) -> Self {
+        Self::All(vec![number])
     }
 }
 
@@ -237,35 +341,6 @@ impl PerMovement {
             Self::Each(rows) => rows.row(b),
         }
     }
-}
-
-/// Returns the time constant in seconds, if given. Refuses conditions on which the unit responses of a batch would depend.
-fn time_constant(primitive: &Primitive, conditions: &Conditions) -> Result<Option<f64>> {
-    let kind = primitive.kind();
-    reject_for_kind(kind, "phase", kind == Kind::Discrete && conditions.phase.is_some())?;
-    if conditions.phase.is_some_and(|phase| phase != 0.0) {
-        let problem = "does not apply: the movements of a batch start at phase 0; compute rollouts one by one";
-        return Err(Error::Argument { name: "phase", problem });
-    }
-    if conditions.segment_durations.as_ref().is_some_and(|durations| durations.len() > 1) {
-        let problem = "does not apply: batches are available in linear time only; pass tau instead";
-        return Err(Error::Argument { name: "segment_durations", problem });
-    }
-    let given = conditions.tau.is_some() || conditions.segment_durations.is_some();
-    given.then(|| conditions.time_constant(primitive)).transpose()
-}
-
-/// Returns the common value of a number, if given, with `default` for those that are absent.
-fn common(name: &'static str, values: &[Option<f64>], default: f64) -> Result<Option<f64>> {
-    let value = |given: &Option<f64>| given.unwrap_or(default);
-    let first = values.first().map_or(default, value);
-    if values.iter().any(|each| (value(each) - first).abs() > MAX_DIFFERENCE * first.abs()) {
-        return Err(Error::Argument {
-            name,
-            problem: "differs between the movements: a batch has one; pass it for all",
-        });
-    }
-    Ok(values.iter().any(Option::is_some).then_some(first))
 }
 
 /// Returns the common additional forcing.

@@ -89,7 +89,7 @@ impl Controllers {
 
     /// Returns the number of movements that the next tick advances in compact memory.
     pub fn n_steady(&self) -> usize {
-        (0..self.len()).filter(|&b| self.steady.holds(b)).count()
+        self.steady.len()
     }
 
     /// Performs one tick without new commands of the movements that `mask` (B,) selects, or of all, and writes their motion.
@@ -98,9 +98,9 @@ impl Controllers {
     /// A mask or outputs of a wrong length, or a tick longer than 1000 τ of a movement. No movement is changed then.
     pub fn step(&mut self, mask: Option<&[bool]>, motions: &mut Motions) -> Result<()> {
         self.check(mask, motions)?;
-        for (b, controller) in self.controllers.iter().enumerate() {
-            if !self.steady.holds(b) && is_selected(mask, b) {
-                controller.check_tick_length(controller.dt(), None)?;
+        for b in self.unsteady() {
+            if is_selected(mask, b) {
+                self.controllers[b].check_tick_length(self.dt(), None)?;
             }
         }
         self.advance(mask, motions, |controller, _| controller.step())
@@ -320,7 +320,8 @@ impl Controllers {
             self.leave(self.ending[i] as usize);
         }
         let (n_coordinates, n_dofs) = (self.primitive().n_coordinates(), self.primitive().n_dofs());
-        for b in 0..self.len() {
+        let n = if self.steady.len() < self.len() { self.len() } else { 0 };
+        for b in 0..n {
             if self.steady.holds(b) || !is_selected(mask, b) {
                 continue;
             }
@@ -334,6 +335,12 @@ impl Controllers {
             self.steady.admit(b, controller);
         }
         Ok(())
+    }
+
+    /// Returns the movements that are not steady.
+    fn unsteady(&self) -> impl Iterator<Item = usize> {
+        let n = if self.steady.len() < self.len() { self.len() } else { 0 };
+        (0..n).filter(|&b| !self.steady.holds(b))
     }
 
     /// Checks the lengths of a mask and of outputs.

@@ -195,7 +195,7 @@ impl Kernel for Sample<'_, '_> {
         let (t, n_dofs) = (since / interval, position.len());
         for (group, (here, next)) in path.knot(i).iter().zip(path.knot(i + 1)).enumerate() {
             let dofs = group * WIDTH..n_dofs.min((group + 1) * WIDTH);
-            let [from, to] = [here, next].map(Derivatives::<T>::load);
+            let [from, to] = Derivatives::<T>::load_both([here, next]);
             let Derivatives { slope, bend } = from.between(to, interval, t);
             unpad((T::load(&here[0]) + from.way(to, interval, t)).store(), &mut position[dofs.clone()]);
             unpad((slope * rate).store(), &mut velocity[dofs.clone()]);

@@ -123,11 +123,13 @@ impl<T: Register> Row<T> {
     #[inline(always)]
     fn of_turn(turn: &TurnDerivatives, acceleration: f64, twice: f64) -> [Self; SIDE_GROUPS] {
         let [beta, along, across] = in_plane(turn, twice);
-        NORMALS.map(|[cosine, sine]| {
-            let [cosine, sine] = [cosine, sine].map(|x| T::load(&F64x4::new(x)));
+        let mut rows = [Self { slope: T::default(), half: T::default() }; SIDE_GROUPS];
+        for (row, [cosine, sine]) in rows.iter_mut().zip(NORMALS) {
+            let (cosine, sine) = (T::load(&F64x4::new(cosine)), T::load(&F64x4::new(sine)));
             let side = Derivatives { slope: cosine * beta, bend: cosine * along + sine * across };
-            Self::new(side, T::splat(SIDE * acceleration), 0.0)
-        })
+            *row = Self::new(side, T::splat(SIDE * acceleration), 0.0);
+        }
+        rows
     }
 
     #[inline(always)]
@@ -172,7 +174,7 @@ impl IntervalLimits {
         let interval = path.interval(i);
         let [mut at_start, mut in_middle] = [T::default(); 2];
         for (ends, limits) in path.ends(i, limits) {
-            let ([here, next], acceleration) = (ends.map(Derivatives::<T>::load), T::load(&limits.acceleration));
+            let ([here, next], acceleration) = (Derivatives::<T>::load_both(ends), T::load(&limits.acceleration));
             let middle = here.between(next, interval, 0.5);
             at_start = at_start.fast_max(limits.of_velocity(here.slope));
             in_middle = in_middle.fast_max(limits.of_velocity(middle.slope));
@@ -192,17 +194,15 @@ impl IntervalLimits {
             let middle = here.between(&next, interval, 0.5);
             let at = [&here, &middle].map(|turn| of_angular_velocity(limits, turn.slope));
             by_turns = [by_turns[0].max(at[0]), by_turns[1].max(at[1])];
-            let mut visit_turn = |turn: &TurnDerivatives, twice: f64| {
-                Row::of_turn(turn, limits.acceleration, twice).into_iter().for_each(&mut visit);
-            };
-            visit_turn(&here, 0.0);
-            visit_turn(&middle, interval);
-            visit_turn(&next, 2.0 * interval);
+            visit_turn(&here, limits.acceleration, 0.0, &mut visit);
+            visit_turn(&middle, limits.acceleration, interval, &mut visit);
+            visit_turn(&next, limits.acceleration, 2.0 * interval, &mut visit);
             let [slopes, bends] =
                 [[here.slope, next.slope], [here.bend, next.bend]].map(|ends| ends.map(|v| dot(v, v).sqrt()));
             if bends[0].max(bends[1]) * (REVERSAL * interval) > slopes[0].min(slopes[1]) {
-                visit_turn(&here.between(&next, interval, 0.25), 0.5 * interval);
-                visit_turn(&here.between(&next, interval, 0.75), 1.5 * interval);
+                let (first, last) = (here.between(&next, interval, 0.25), here.between(&next, interval, 0.75));
+                visit_turn(&first, limits.acceleration, 0.5 * interval, &mut visit);
+                visit_turn(&last, limits.acceleration, 1.5 * interval, &mut visit);
             }
         }
         self.most = largest(at_start).max(by_turns[0]).recip();
@@ -289,6 +289,16 @@ impl IntervalLimits {
             }
         }
         (x, leads)
+    }
+}
+
+/// Visits the rows of a rotation.
+#[inline(always)]
+#[allow(clippy::needless_range_loop)] // See `Kernel`.
+fn visit_turn<T: Register>(turn: &TurnDerivatives, acceleration: f64, twice: f64, visit: &mut impl FnMut(Row<T>)) {
+    let rows = Row::of_turn(turn, acceleration, twice);
+    for i in 0..SIDE_GROUPS {
+        visit(rows[i]);
     }
 }
 

@@ -96,6 +96,12 @@ impl<T: Register> Derivatives<T> {
         Self { slope: T::load(slope), bend: T::load(bend) }
     }
 
+    /// Returns those of two samples.
+    #[inline(always)]
+    pub(crate) fn load_both([here, next]: [&[F64x4; 3]; 2]) -> [Self; 2] {
+        [Self::load(here), Self::load(next)]
+    }
+
     /// Returns those at a position `t` from 0 to 1 in an interval: the cubic Hermite interpolation of y′, and its derivative.
     #[inline(always)]
     pub(crate) fn between(self, next: Self, interval: f64, t: f64) -> Self {

@@ -87,7 +87,7 @@ impl Kernel for Constant<'_> {
         for (i, constant) in curve.constant[..last].iter_mut().enumerate() {
             let (interval, mut inverse) = (path.interval(i), T::default());
             for (ends, limits) in path.ends(i, limits) {
-                let [here, next] = ends.map(Derivatives::<T>::load);
+                let [here, next] = Derivatives::<T>::load_both(ends);
                 inverse = inverse.fast_max(limits.of_constant(here));
                 inverse = inverse.fast_max(limits.of_constant(here.between(next, interval, 0.5)));
             }

@@ -63,8 +63,8 @@ impl Batch {
     ///
     /// # Errors
     /// A range beyond the batch; cotangents of another number or shape, or that are not finite; a variable of the other
-    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations; a primitive with
-    /// rotations; or the error of `progress`.
+    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations; movements without
+    /// response curves in common; a primitive with rotations; or the error of `progress`.
     pub fn vector_jacobian(
         &self,
         movements: Range<usize>,
@@ -123,6 +123,9 @@ impl Batch {
     ) -> Result<()> {
         let (n_movements, n_samples, n_dofs) = self.shape();
         let wrong = |name, problem| Err(Error::Argument { name, problem });
+        if self.singles.is_some() {
+            return wrong("conditions", "must have one tau, linear time and phase 0 in common: call once for each tau");
+        }
         if self.pose.is_some() {
             return wrong("cotangents", "do not apply to a model with rotations: pass its Jacobians to your framework");
         }
@@ -176,7 +179,7 @@ impl Batch {
         };
         match variable {
             WithRespectTo::Style => {
-                gradient.indexed_iter_mut().for_each(|(j, to)| *to = self.amplitude * unit_style(j))
+                gradient.indexed_iter_mut().for_each(|(j, to)| *to = self.amplitudes.row(b)[0] * unit_style(j))
             }
             WithRespectTo::Amplitude => {
                 gradient[0] = self.styles.row(b).indexed_iter().fold(0.0, |sum, (j, s)| sum + s * unit_style(j));

@@ -47,7 +47,7 @@ impl Bounds {
     pub(crate) fn admits<T: Register>(&self, from: [T; 2], to: [T; 2], acceleration: T, h: f64) -> T {
         let ([[y, v], [y_end, v_end]], zero) = ([from, to], T::default());
         let [lower, upper, max_velocity, max_acceleration, braking] =
-            [&self.lower, &self.upper, &self.velocity, &self.acceleration, &self.braking].map(T::load);
+            T::load_all([&self.lower, &self.upper, &self.velocity, &self.acceleration, &self.braking]);
         let (above, below) = (upper - y_end, y_end - lower);
         let (square, twice) = (v_end * v_end.abs(), braking * 2.0);
         let kept = (v_end - v).abs().simd_le(max_acceleration * h)
@@ -69,7 +69,7 @@ impl Bounds {
         if (first.fast_max(last).simd_le(upper) & lower.simd_le(first.fast_min(last))).all() {
             return kept;
         }
-        let [least, greatest] = extremes([y, v].map(T::store), [y_end, v_end].map(T::store), h);
+        let [least, greatest] = extremes([y.store(), v.store()], [y_end.store(), v_end.store()], h);
         kept & T::load(&greatest).simd_le(upper) & lower.simd_le(T::load(&least))
     }
 

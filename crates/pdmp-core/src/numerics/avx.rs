@@ -27,14 +27,23 @@ pub(super) unsafe fn compute<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx2>()
 }
 
-/// Register of four DoFs. Only [`compute`] instantiates it, which runs only on processors with AVX2.
+/// Computes a formula with twice the registers, and with factors from memory that an instruction repeats in all lanes.
+///
+/// # Safety
+/// The processor has AVX2 and the 256-bit instructions of AVX-512.
+#[target_feature(enable = "avx2,avx512f,avx512vl")]
+pub(super) unsafe fn compute_by_more_registers<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx2>()
+}
+
+/// Register of four DoFs. Only the functions above instantiate it, which run only on processors with AVX2.
 #[derive(Clone, Copy)]
 struct Avx2(__m256d);
 
 impl Default for Avx2 {
     #[inline(always)]
     fn default() -> Self {
-        // SAFETY: values of this type exist only inside `compute`, so the processor has AVX2.
+        // SAFETY: values of this type exist only inside the functions above, so the processor has AVX2.
         Self(unsafe { _mm256_setzero_pd() })
     }
 }

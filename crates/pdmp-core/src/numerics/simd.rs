@@ -48,6 +48,17 @@ pub(crate) trait Register:
     /// Returns the columns of four rows.
     fn transpose(rows: [Self; WIDTH]) -> [Self; WIDTH];
 
+    /// Loads several groups.
+    #[inline(always)]
+    fn load_all<const N: usize>(lanes: [&F64x4; N]) -> [Self; N] {
+        let (mut registers, mut i) = ([Self::default(); N], 0);
+        while i < N {
+            registers[i] = Self::load(lanes[i]);
+            i += 1;
+        }
+        registers
+    }
+
     /// Returns a register with the same value in all lanes.
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -121,6 +132,9 @@ impl Register for F64x4 {
 }
 
 /// Formula in registers of any type.
+///
+/// No closure in it computes with registers, as in `[a, b].map(|x| x * y)`, and no iterator passes them: these are functions
+/// of their own, which lack the target feature, so that operations remain calls in them. A tick then takes six times as long.
 pub(crate) trait Kernel {
     type Output;
 
@@ -138,6 +152,22 @@ pub(crate) fn compute<K: Kernel>(kernel: K) -> K::Output {
         return unsafe { super::avx::compute(kernel) };
     }
     compute_portable(kernel)
+}
+
+/// Computes a formula of many steps in the largest registers of the processor, with code of its own for more processors than
+/// [`compute`].
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(crate) fn compute_many<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2")
+        && std::arch::is_x86_feature_detected!("avx512f")
+        && std::arch::is_x86_feature_detected!("avx512vl")
+    {
+        // SAFETY: the processor has these features.
+        return unsafe { super::avx::compute_by_more_registers(kernel) };
+    }
+    compute(kernel)
 }
 
 /// Computes a formula with the instructions of every processor. It stays a call, so that its callers stay small.

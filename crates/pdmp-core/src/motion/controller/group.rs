@@ -101,7 +101,7 @@ impl Gate {
     /// Returns w and w′.
     #[inline(always)]
     pub(super) fn forcing<T: Register>(&self, sample: &ForcingSample) -> CubicSample<T> {
-        let [value, slope, style_slope] = [&sample.value, &sample.slope, &sample.style_slope].map(T::load);
+        let [value, slope, style_slope] = T::load_all([&sample.value, &sample.slope, &sample.style_slope]);
         CubicSample {
             value: value * self.r,
             slope: (slope * self.phase_rate + style_slope) * self.r + value * self.r_slope,

@@ -183,7 +183,7 @@ impl Controller {
             let largest = T::load(&bounds.acceleration);
             let reduced = T::load(&acceleration[index]).fast_max(-largest).fast_min(largest);
             acceleration[index] = reduced.store();
-            let [from, to] = [[y, v], [&position[index], &velocity[index]]].map(|state| state.map(T::load));
+            let (from, to) = (T::load_all([y, v]), T::load_all([&position[index], &velocity[index]]));
             kept_by_all &= bounds.admits(from, to, reduced, dt).all();
         }
         kept_by_all

@@ -224,8 +224,9 @@ impl Kernel for Slopes<'_> {
                 let Derivatives { slope, bend } =
                     Derivatives::<T>::load(here).between(Derivatives::load(next), interval, position);
                 // Near a reversal, where y″ρ² alone reaches the tighter limit, ρ̇ has no effect and must not be driven by it.
-                let [tight, wide] =
-                    TICK_MARGINS.map(|margin| T::load(&limits.acceleration) * ((1.0 - margin) / (1.0 - MARGINS[1])));
+                let [tight, wide] = TICK_MARGINS.map(|margin| (1.0 - margin) / (1.0 - MARGINS[1]));
+                let limit = T::load(&limits.acceleration);
+                let (tight, wide) = (limit * tight, limit * wide);
                 let by_bend = bend * x;
                 let acceleration = by_bend.abs().fast_max(tight).fast_min(wide);
                 let share = T::splat(1.0) / (slope + bend * (2.0 * since));
@@ -285,11 +286,11 @@ impl Kernel for Outside<'_> {
         let Self { path, first, bounds, groups } = self;
         let (zero, mut farthest) = (T::default(), 0.0f64);
         for (index, (bounds, group)) in bounds.iter().zip(groups).enumerate() {
-            let [lower, upper, range] = [&bounds.lower, &bounds.upper, &group.range].map(T::load);
+            let [lower, upper, range] = T::load_all([&bounds.lower, &bounds.upper, &group.range]);
             let mut outside = zero;
             for knot in first..N_INTERVALS {
-                let [[y, slope, _], [next, next_slope, _]] =
-                    [knot, knot + 1].map(|knot| path.knot(knot)[index].each_ref().map(T::load));
+                let [y, slope, _] = T::load_all(path.knot(knot)[index].each_ref());
+                let [next, next_slope, _] = T::load_all(path.knot(knot + 1)[index].each_ref());
                 outside = outside.fast_max(next - upper).fast_max(lower - next);
                 let turns = (slope * next_slope).simd_lt(zero);
                 if turns.to_bitmask() != 0 {

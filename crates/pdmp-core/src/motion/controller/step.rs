@@ -219,7 +219,7 @@ impl Controller {
             group.w = CubicSample { value: to.value.store(), slope: to.slope.store() };
 
             let (goal, displacement) = (T::load(&centre.value()[index]), T::load(&group.displacement));
-            let [mut start, mut origin] = lags.map(|lag| goal + displacement * lag);
+            let (mut start, mut origin) = (goal + displacement * lags[0], goal + displacement * lags[1]);
             let mut w = add_frame_motion(to, displacement, frame_slopes);
             if transition {
                 let frame = self.goal_transition.sample::<T>(index, clock);
