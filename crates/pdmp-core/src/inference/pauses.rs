@@ -45,7 +45,7 @@ pub(crate) struct Pauses {
     variances: Vec<f64>,
     /// Probability that the movement is stopped.
     pub(crate) probability: f64,
-    /// Whether the clock of the movement rests.
+    /// True while the clock of the movement rests.
     pub(crate) stopped: bool,
     /// Time of the begin of the window, in seconds.
     since: f64,
