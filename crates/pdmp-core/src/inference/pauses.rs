@@ -23,6 +23,8 @@ const SPEED_DEVIATION: f64 = 0.5;
 const STOP: f64 = 0.9;
 /// Probability from which on it rests no longer.
 const RESUME: f64 = 0.5;
+/// Largest relative speed by which the clock advances as it goes on.
+const MAX_SPEED: f64 = 2.0;
 /// Largest logarithm of the ratio of likelihoods in a window.
 const MAX_LOG_RATIO: f64 = 8.0;
 
@@ -100,8 +102,9 @@ impl Pauses {
         self.velocity.fill(f64::NAN);
     }
 
-    /// Returns the logarithm of the ratio of the likelihoods of a pause and of a movement that goes on.
-    fn log_ratio(&self, span: f64, position: &[f64]) -> f64 {
+    /// Returns the observed speed relative to the predicted one, and the logarithm of the ratio of the likelihoods of a pause
+    /// and of a movement that goes on.
+    fn compare(&self, span: f64, position: &[f64]) -> (f64, f64) {
         let (mut moved, mut predicted) = (0.0, 0.0);
         for (d, y) in position.iter().enumerate() {
             let (own, expected) = (y - self.anchor[d], span * self.velocity[d]);
@@ -113,22 +116,22 @@ impl Pauses {
         }
         // Over longer intervals the velocity is not constant.
         if predicted <= 0.0 || span > 2.0 * WINDOW * self.duration {
-            return 0.0;
+            return (1.0, 0.0);
         }
         let ratio = (moved.max(0.0) / predicted).sqrt();
         let variance = SPEED_DEVIATION * SPEED_DEVIATION + predicted.recip();
-        ((0.5 - ratio) / variance).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO)
+        (ratio, ((0.5 - ratio) / variance).clamp(-MAX_LOG_RATIO, MAX_LOG_RATIO))
     }
 
-    /// Includes a window, and returns the logarithm of its ratio.
-    fn filter(&mut self, span: f64, position: &[f64]) -> f64 {
-        let log_ratio = self.log_ratio(span, position);
+    /// Includes a window, and returns its speed and ratio as [`Self::compare`] does.
+    fn filter(&mut self, span: f64, position: &[f64]) -> (f64, f64) {
+        let (speed, log_ratio) = self.compare(span, position);
         let steps = span / self.duration;
         let (stays, begins) = ((-steps / LENGTH).exp(), 1.0 - (-steps * RATE).exp());
         let before = self.probability * stays + (1.0 - self.probability) * begins;
         let odds = before / (1.0 - before) * log_ratio.exp();
         self.probability = odds / (1.0 + odds);
-        log_ratio
+        (speed, log_ratio)
     }
 }
 
@@ -141,7 +144,8 @@ impl Recogniser {
         if span < WINDOW * pauses.duration {
             return;
         }
-        let log_ratio = if pauses.velocity[0].is_nan() { 0.0 } else { pauses.filter(span, position) };
+        let unknown = pauses.velocity[0].is_nan();
+        let (speed, log_ratio) = if unknown { (1.0, 0.0) } else { pauses.filter(span, position) };
         match (pauses.stopped, pauses.probability > if pauses.stopped { RESUME } else { STOP }) {
             (true, true) => pauses.since = time,
             (false, true) => {
@@ -156,7 +160,8 @@ impl Recogniser {
             (stopped, false) => {
                 pauses.stopped = false;
                 if stopped {
-                    self.include(span, position);
+                    // The way from where it rested gives the time since when it goes on.
+                    self.include(span * speed.min(MAX_SPEED), position);
                 }
                 self.begin_window(time, position, log_ratio <= 0.0);
             }
