@@ -62,8 +62,11 @@ pub struct pdmp_estimate {
     pub fraction: f64,
     /// Standard deviation of `fraction`.
     pub fraction_deviation: f64,
+    /// Probability that the movement is stopped. From 0.9 on, its clock rests until it is below 0.5: fraction and positions to
+    /// come are those of a movement that goes on at once, and the arrival is later by the pause.
+    pub stopped: f64,
     /// Mean squared residual, relative to that which one in ten held-out demonstrations exceeds. Above 1 the movement is unlike the
-    /// demonstrations, or pauses.
+    /// demonstrations.
     pub surprise: f64,
 }
 
@@ -213,6 +216,7 @@ pub extern "C" fn pdmp_recogniser_estimate(
             arrival: estimate.arrival,
             fraction: estimate.fraction,
             fraction_deviation: estimate.fraction_deviation,
+            stopped: estimate.stopped,
             surprise: estimate.surprise,
         });
         Ok(())
