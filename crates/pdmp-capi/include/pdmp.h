@@ -332,8 +332,11 @@ typedef struct {
     double fraction;
     /// Standard deviation of `fraction`.
     double fraction_deviation;
+    /// Probability that the movement is stopped. From 0.9 on, its clock rests until it is below 0.5: fraction and positions to
+    /// come are those of a movement that goes on at once, and the arrival is later by the pause.
+    double stopped;
     /// Mean squared residual, relative to that which one in ten held-out demonstrations exceeds. Above 1 the movement is unlike the
-    /// demonstrations, or pauses.
+    /// demonstrations.
     double surprise;
 } pdmp_estimate;
 
