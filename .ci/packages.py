@@ -9,7 +9,7 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-MAX_WHEEL = 3_500_000  # bytes
+MAX_WHEEL = 3_000_000  # bytes
 PROGRAM = """
 import sys
 from pathlib import Path

@@ -2,15 +2,20 @@
 //!
 //! The loops run over contiguous memory, across samples and DoFs. Each element is summed in the same order regardless of
 //! its position, so that results do not depend on the division of a batch.
+// Closures of iterators stay calls, into which the instructions of larger registers are not inlined.
+#![allow(clippy::needless_range_loop)]
 
 use std::ops::Range;
 
 use ndarray::{ArrayViewMut3, Axis};
 
 use crate::model::responses::{Curves, Derivative};
+use crate::numerics::simd::{Kernel, Register, WIDTH, compute};
 use crate::validate::row_major;
 
-/// Minimum length to which the coefficients of the DoFs are repeated, for loops that fill vector registers.
+/// Number of elements that are summed at once.
+const BLOCK: usize = 4 * WIDTH;
+/// Minimum length to which the coefficients of the DoFs are repeated, to a multiple of [`BLOCK`].
 const MIN_PATTERN: usize = 64;
 /// Number of elements of a tile: its responses are read from cache for all movements of a block.
 const TILE: usize = 1024;
@@ -38,9 +43,9 @@ impl Combination {
     }
 }
 
-/// Repeats values (D,) to at least [`MIN_PATTERN`] elements.
+/// Repeats values (D,) to at least [`MIN_PATTERN`] elements, a multiple of [`BLOCK`].
 fn pattern(values: &[f64]) -> Vec<f64> {
-    values.repeat(MIN_PATTERN.div_ceil(values.len()))
+    values.repeat(MIN_PATTERN.div_ceil(values.len()).next_multiple_of(BLOCK))
 }
 
 /// Writes one derivative of movements (B, T, D).
@@ -95,37 +100,83 @@ impl<'a> Tile<'a> {
 
     /// Writes the tile of one movement, with the repeated coefficients `centre` of g.
     pub(crate) fn sum(&self, combination: &Combination, centre: &[f64], out: &mut [f64]) {
-        let Combination { style, start, velocity, .. } = combination;
+        compute(Sum { tile: self, combination, centre, out });
+    }
+}
+
+/// Kernel of [`Tile::sum`].
+struct Sum<'a> {
+    tile: &'a Tile<'a>,
+    combination: &'a Combination,
+    centre: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Kernel for Sum<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Register>(self) {
+        let Self { tile, combination, centre, out } = self;
+        let Combination { style, start, velocity, goal_velocity, .. } = combination;
         let period = centre.len();
-        let responses = self.start.chunks(period).zip(self.velocity.chunks(period));
-        for (out, (e, v)) in out.chunks_mut(period).zip(responses) {
-            let coefficients = centre.iter().zip(start).zip(velocity);
-            for (((out, ((g, start), velocity)), e), v) in out.iter_mut().zip(coefficients).zip(e).zip(v) {
-                *out = g + start * e + velocity * v;
+        let n_whole = out.len() - out.len() % BLOCK;
+        let (mut at, mut within) = (0, 0);
+        while at < n_whole {
+            let mut sums = load::<T>(centre, within);
+            add_products(&mut sums, load(start, within), load(tile.start, at));
+            add_products(&mut sums, load(velocity, within), load(tile.velocity, at));
+            if let (Some(velocity), Some(curve)) = (goal_velocity, tile.goal_velocity) {
+                add_products(&mut sums, load(velocity, within), load(curve, at));
             }
-        }
-        if let (Some(velocity), Some(responses)) = (&combination.goal_velocity, self.goal_velocity) {
-            for (out, responses) in out.chunks_mut(period).zip(responses.chunks(period)) {
-                out.iter_mut().zip(velocity).zip(responses).for_each(|((out, velocity), g)| *out += velocity * g);
+            for j in 0..style.len() {
+                add_products(&mut sums, [T::splat(style[j]); BLOCK / WIDTH], load(tile.styles[j], at));
             }
+            store(sums, &mut out[at..]);
+            at += BLOCK;
+            within = if within + BLOCK == period { 0 } else { within + BLOCK };
         }
-        // Four styles per pass over the output reduce its loads and stores.
-        for (s, curves) in style.chunks(4).zip(self.styles.chunks(4)) {
-            match (s, curves) {
-                (&[a, b, c, d], [r, s, t, u]) => add([a, b, c, d], [r, s, t, u], out),
-                (&[a, b, c], [r, s, t]) => add([a, b, c], [r, s, t], out),
-                (&[a, b], [r, s]) => add([a, b], [r, s], out),
-                _ => s.iter().zip(curves).for_each(|(&s, curve)| add([s], [curve], out)),
+        for (i, out) in out.iter_mut().enumerate().skip(n_whole) {
+            let within = i % period;
+            *out = centre[within] + start[within] * tile.start[i] + velocity[within] * tile.velocity[i];
+            if let (Some(velocity), Some(curve)) = (goal_velocity, tile.goal_velocity) {
+                *out += velocity[within] * curve[i];
+            }
+            for j in 0..style.len() {
+                *out += style[j] * tile.styles[j][i];
             }
         }
     }
 }
 
-/// Adds curves, multiplied by their coefficients, to `out`.
+/// Loads a block of numbers from one on.
 #[inline(always)]
-fn add<const N: usize>(coefficients: [f64; N], curves: [&[f64]; N], out: &mut [f64]) {
-    let curves = curves.map(|curve| &curve[..out.len()]);
-    for (i, out) in out.iter_mut().enumerate() {
-        *out += (0..N).fold(0.0, |sum, j| sum + coefficients[j] * curves[j][i]);
+fn load<T: Register>(numbers: &[f64], at: usize) -> [T; BLOCK / WIDTH] {
+    let mut registers = [T::default(); BLOCK / WIDTH];
+    if let Some(block) = numbers[at..].first_chunk::<BLOCK>() {
+        let (fours, _) = block.as_chunks();
+        for k in 0..BLOCK / WIDTH {
+            registers[k] = T::load_numbers(&fours[k]);
+        }
+    }
+    registers
+}
+
+/// Adds the products of two blocks.
+#[inline(always)]
+fn add_products<T: Register>(sums: &mut [T; BLOCK / WIDTH], factors: [T; BLOCK / WIDTH], values: [T; BLOCK / WIDTH]) {
+    for k in 0..BLOCK / WIDTH {
+        sums[k] = sums[k] + factors[k] * values[k];
+    }
+}
+
+/// Writes a block to the first numbers.
+#[inline(always)]
+fn store<T: Register>(sums: [T; BLOCK / WIDTH], numbers: &mut [f64]) {
+    if let Some(block) = numbers.first_chunk_mut::<BLOCK>() {
+        let (fours, _) = block.as_chunks_mut();
+        for k in 0..BLOCK / WIDTH {
+            sums[k].store_numbers(&mut fours[k]);
+        }
     }
 }

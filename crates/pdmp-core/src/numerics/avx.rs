@@ -10,9 +10,9 @@
 use std::arch::x86_64::{
     __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _mm_cvtsd_f64, _mm_min_pd, _mm_min_sd, _mm_unpackhi_pd, _mm256_add_pd,
     _mm256_and_pd, _mm256_andnot_pd, _mm256_castpd256_pd128, _mm256_cmp_pd, _mm256_div_pd, _mm256_extractf128_pd,
-    _mm256_load_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_permute2f128_pd,
-    _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_store_pd, _mm256_sub_pd, _mm256_unpackhi_pd,
-    _mm256_unpacklo_pd, _mm256_xor_pd,
+    _mm256_load_pd, _mm256_loadu_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
+    _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_store_pd, _mm256_storeu_pd,
+    _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd, _mm256_xor_pd,
 };
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
@@ -106,6 +106,18 @@ impl Register for Avx2 {
         // SAFETY: see `load`. The exclusive reference makes them writable.
         unsafe { _mm256_store_pd(std::ptr::from_mut(&mut lanes).cast(), self.0) };
         lanes
+    }
+
+    #[inline(always)]
+    fn load_numbers(numbers: &[f64; WIDTH]) -> Self {
+        // SAFETY: see `default`. The reference makes four doubles readable, and they need no alignment.
+        Self(unsafe { _mm256_loadu_pd(numbers.as_ptr()) })
+    }
+
+    #[inline(always)]
+    fn store_numbers(self, numbers: &mut [f64; WIDTH]) {
+        // SAFETY: see `load_numbers`. The exclusive reference makes them writable.
+        unsafe { _mm256_storeu_pd(numbers.as_mut_ptr(), self.0) };
     }
 
     #[inline(always)]

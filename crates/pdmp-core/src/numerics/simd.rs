@@ -29,6 +29,10 @@ pub(crate) trait Register:
     fn load(lanes: &F64x4) -> Self;
     /// Returns the lanes as a group.
     fn store(self) -> F64x4;
+    /// Loads four numbers from anywhere in memory.
+    fn load_numbers(numbers: &[f64; WIDTH]) -> Self;
+    /// Writes the lanes to four numbers anywhere in memory.
+    fn store_numbers(self, numbers: &mut [f64; WIDTH]);
     /// Returns the magnitudes.
     fn abs(self) -> Self;
     /// Returns the square roots.
@@ -81,6 +85,16 @@ impl Register for F64x4 {
     #[inline(always)]
     fn store(self) -> F64x4 {
         self
+    }
+
+    #[inline(always)]
+    fn load_numbers(numbers: &[f64; WIDTH]) -> Self {
+        Self::new(*numbers)
+    }
+
+    #[inline(always)]
+    fn store_numbers(self, numbers: &mut [f64; WIDTH]) {
+        *numbers = self.to_array();
     }
 
     #[inline(always)]
