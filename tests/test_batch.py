@@ -279,7 +279,7 @@ def test_jacobian_follows_the_amplitude(cycle: pdmp.Model) -> None:
 
 
 REJECTED: list[tuple[dict[str, Any], str]] = [
-    ({"goal": np.zeros((3, 2))}, "goal has 3 rows, but there are 23 movements: pass one row for"),
+    ({"goal": np.zeros((3, 2))}, "goal has 3 rows, but there are 23 movements: pass one for each"),
     ({"start": np.zeros((23, 3))}, "start has length 3, expected 2: one value per DoF"),
     ({"velocity": [0.0]}, "velocity has length 1, expected 2: one value per DoF"),
     ({"start": np.where(np.arange(46) == 35, NAN, 0).reshape(23, 2)}, r"start\[17, 1\] = NaN"),

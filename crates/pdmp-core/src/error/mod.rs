@@ -86,10 +86,8 @@ pub enum Error {
         /// The allowed values, as the end of the sentence.
         allowed: &'static str,
     },
-    /// A number of vectors that differs from the number of movements.
-    #[error(
-        "{name} has {found} rows, but there are {expected} movements: pass one row for each, or one vector for all"
-    )]
+    /// A number of vectors or numbers that differs from the number of movements.
+    #[error("{name} has {found} rows, but there are {expected} movements: pass one for each, or one for all")]
     Rows {
         /// The argument.
         name: &'static str,
