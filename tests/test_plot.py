@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +118,21 @@ def test_fan_has_a_movement_per_share(model: pdmp.Model) -> None:
     assert len(figure.axes[0].lines) == 6
     ticks = [text.get_text() for text in figure.axes[-1].get_yticklabels()]
     assert ticks == ["left", "half way", "right"]
+
+
+def test_labels_of_equal_axes_are_inside_the_figure() -> None:
+    """The limits of a path, and so the width of its tick labels, are known once it is drawn."""
+    rng, t = np.random.default_rng(3), np.linspace(0, 1.5, 180)
+    demos = []
+    for height in (0.1, 0.15, 0.2, 0.3, 0.35):
+        x = 0.5 * np.sin(np.pi * t / 3) + 0.002 * rng.normal(size=180)
+        z = height * np.sin(np.pi * t / 1.5) ** 2 + 0.002 * rng.normal(size=180)
+        demos.append(pdmp.Demonstration(np.column_stack([x, z]), time=t, units=["m", "m"]))
+    model = pdmp.fit(demos)
+    figure = plot.fan(model, model.conditions(0), model.conditions(4))
+    figure.savefig(BytesIO())
+    for axes in figure.axes:
+        assert axes.yaxis.label.get_window_extent().x0 >= 0
 
 
 def test_fan_needs_two_ends(model: pdmp.Model) -> None:
