@@ -9,7 +9,7 @@ import pdmp
 from pdmp import Demonstration
 from pdmp._markdown import markdown_table
 from recordings import is_available, recorded, rows, walking_strides
-from report.recognition import MAX_FOLDS, SHARES, Simple
+from report.observed import MAX_FOLDS, SHARES, Simple, sampled, shown
 
 LEFT_ARM = ["l_sh1", "l_sh2", "l_sh3", "l_elb"]
 RIGHT_ARM = ["r_sh1", "r_sh2", "r_sh3", "r_elb"]
@@ -58,19 +58,13 @@ def one(
     model: pdmp.Model, prior: pdmp.Prior, simple: Simple, demo: Demonstration, n_observed: int
 ) -> np.ndarray:
     """Returns the errors (shares, predictors) of one movement."""
-    step = max(1, demo.n_samples // 60)
-    time, position = demo.time[::step] - demo.time[0], demo.position[::step]
+    time, position = sampled(demo)
     duration = demo.time[-1] - demo.time[0]
     seen = position.copy()
     seen[:, n_observed:] = np.nan
     unknown, known = model.recogniser(prior), model.recogniser(prior, duration=duration)
-    found, last = [], 0
-    for share in SHARES:
-        n = max(2, int(np.searchsorted(time, share * duration)) + 1)
-        for k in range(last, n):
-            unknown.update(time[k], seen[k])
-            known.update(time[k], seen[k])
-        last = n
+    found = []
+    for n in shown([unknown, known], time, seen, duration):
         predictions = [each.continuation(time[n:]).position for each in (unknown, known)]
         predictions += simple.predict(time, seen[:n], duration)[:2]
         rests = [each[:, n_observed:] - position[n:, n_observed:] for each in predictions]

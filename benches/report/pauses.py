@@ -5,6 +5,7 @@ import numpy as np
 import pdmp
 from pdmp import Demonstration
 from pdmp._markdown import markdown_table
+from report.observed import sampled
 
 PAUSES = (0.3, 1.0)  # s
 PLACES = (0.3, 0.6)  # shares of the movement before the pause
@@ -25,8 +26,7 @@ def one(
         same later; errors of the arrival with the pause, in durations, at both places; the time
         after which it was found, or NaN; and whether the movement without it was stopped.
     """
-    step = max(1, demo.n_samples // 60)
-    time, position = demo.time[::step] - demo.time[0], demo.position[::step]
+    time, position = sampled(demo)
     last = int(np.searchsorted(time, rng.uniform(*PLACES) * time[-1]))
     interval = np.median(np.diff(time))
     n = max(2, int(rng.uniform(*PAUSES) / interval))

@@ -16,15 +16,12 @@ import pdmp
 from pdmp import Demonstration
 from pdmp._markdown import markdown_table
 from recordings import ARM, HAND, is_available, recorded, rows
-from report import pauses
-from report.promp import ProMP
+from report import partners, pauses
+from report.observed import MAX_FOLDS, SHARES, Simple, sampled, shown
 from report.sets import cut, numbers
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARES = (0.1, 0.3, 0.5, 0.7)
 BAND = 1.6449  # half-width of a band of 90 %, in standard deviations
-MAX_FOLDS = 10
-PHASES = np.linspace(0, 1, 201)
 RECOGNISER, KNOWN = "recogniser", "recogniser, true time"
 NEAREST, MEAN = "nearest, true time", "mean"
 GAUSSIAN, PROMP = "one Gaussian, true time", "ProMP, true time"
@@ -114,21 +111,15 @@ def evaluated(recordings: Recordings, by_group: bool, most: int) -> Scores:
 
 
 def one(
-    model: pdmp.Model, prior: pdmp.Prior, simple: "Simple", demo: Demonstration
+    model: pdmp.Model, prior: pdmp.Prior, simple: Simple, demo: Demonstration
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Recognises one movement."""
-    step = max(1, demo.n_samples // 60)
-    time, position = demo.time[::step] - demo.time[0], demo.position[::step]
+    time, position = sampled(demo)
     duration = demo.time[-1] - demo.time[0]
     unknown, known = model.recogniser(prior), model.recogniser(prior, duration=duration)
     errors, goals, arrivals, covered = [], [], [], []
-    seen = 0
-    for share in SHARES:
-        n = max(2, int(np.searchsorted(time, share * duration)) + 1)
-        for k in range(seen, n):
-            unknown.update(time[k], position[k])
-            known.update(time[k], position[k])
-        seen, rest = n, position[n:]
+    for n in shown([unknown, known], time, position, duration):
+        rest = position[n:]
         ahead, estimate = unknown.continuation(time[n:]), unknown.estimate()
         predictions = [ahead.position, known.continuation(time[n:]).position]
         predictions += simple.predict(time, position[:n], duration)
@@ -145,47 +136,6 @@ def one(
             ]
         )
     return np.array(errors), np.array(goals), np.array(arrivals), np.array(covered, dtype=float)
-
-
-class Simple:
-    """Predictors without a model of movements."""
-
-    def __init__(self, demos: list[Demonstration]) -> None:
-        self.demos = np.array([resampled(demo.time, demo.position) for demo in demos])
-        self.promp = ProMP(self.demos)
-        self.duration = np.exp(np.mean([np.log(demo.time[-1] - demo.time[0]) for demo in demos]))
-
-    def predict(self, time: np.ndarray, seen: np.ndarray, duration: float) -> list[np.ndarray]:
-        """Returns the rest of a movement (T - n, D) by each predictor."""
-        n, phases = len(seen), time / duration
-        distances = [np.nansum((at(demo, phases[:n]) - seen) ** 2) for demo in self.demos]
-        mean = self.demos.mean(axis=0)
-        nearest = at(self.demos[np.argmin(distances)], phases[n:])
-        gaussian = self.gaussian(phases, seen)
-        promp = self.promp.conditioned(phases[:n], seen, phases[n:])
-        return [nearest, at(mean, time[n:] / self.duration), gaussian, promp]
-
-    def gaussian(self, phases: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """Conditions one Gaussian over whole movements, of the rank of the demonstrations."""
-        n = len(seen)
-        movements = np.array([at(demo, phases) for demo in self.demos])
-        mean = movements.mean(axis=0)
-        deviations = (movements - mean) / np.sqrt(len(movements))
-        before, after = deviations[:, :n].reshape(len(movements), -1), deviations[:, n:]
-        noise = 0.02 * movements.std() + 1e-12
-        kernel = before @ before.T / noise**2 + np.eye(len(movements))
-        weights = np.linalg.solve(kernel, before @ (seen - mean[:n]).ravel() / noise**2)
-        return mean[n:] + np.tensordot(weights, after, 1)
-
-
-def resampled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Returns a movement at even phases."""
-    return at(position, PHASES, (time - time[0]) / (time[-1] - time[0]))
-
-
-def at(position: np.ndarray, phases: np.ndarray, own: np.ndarray = PHASES) -> np.ndarray:
-    """Interpolates a movement (S, D) at phases; past its end it rests."""
-    return np.stack([np.interp(phases, own, column) for column in position.T], axis=1)
 
 
 def table(scores: Scores) -> str:
@@ -269,8 +219,6 @@ def times() -> str:
 
 def main() -> None:
     """Evaluates every set that is available."""
-    from report import partners  # which uses the predictors above
-
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--write", action="store_true", help="write docs/recognition.md")
     arguments.add_argument("--most", type=int, default=20, help="movements of each set and split")
