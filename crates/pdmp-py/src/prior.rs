@@ -40,11 +40,9 @@ impl Prior {
         let kind = if rhythmic { pdmp_core::Kind::Rhythmic } else { pdmp_core::Kind::Discrete };
         let [bandwidth, tempering, correlation_time] = settings;
         let settings = Settings { bandwidth, tempering, correlation_time };
-        let factors =
-            factors.map(|[position, goal, duration, misfit]| BandFactors { position, goal, duration, misfit });
         let parameters = matrix("parameters", "(M, K)", parameters)?;
         let (durations, residual) = (vector("log_durations", log_durations)?, vector("residual", residual)?);
-        let calibration = Calibration(factors);
+        let calibration = Calibration(factors.map(BandFactors::from));
         pdmp_core::inference::Prior::new(kind, parameters, durations, residual, settings, calibration)
             .map(Self)
             .map_err(raise)
@@ -53,8 +51,7 @@ impl Prior {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         let prior = &self.0;
         let Settings { bandwidth, tempering, correlation_time } = prior.settings();
-        let factors =
-            prior.calibration().0.map(|factors| [factors.position, factors.goal, factors.duration, factors.misfit]);
+        let factors = prior.calibration().0.map(<[f64; 4]>::from);
         let arguments = (
             prior.kind() == pdmp_core::Kind::Rhythmic,
             self.parameters(py),

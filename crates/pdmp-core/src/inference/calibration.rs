@@ -34,6 +34,20 @@ impl BandFactors {
     }
 }
 
+impl From<[f64; 4]> for BandFactors {
+    /// Returns the factors in the order of the members.
+    fn from([position, goal, duration, misfit]: [f64; 4]) -> Self {
+        Self { position, goal, duration, misfit }
+    }
+}
+
+impl From<BandFactors> for [f64; 4] {
+    /// Returns the factors in the order of the members.
+    fn from(BandFactors { position, goal, duration, misfit }: BandFactors) -> Self {
+        [position, goal, duration, misfit]
+    }
+}
+
 /// Factors at 10, 30, 50 and 70 % of a movement.
 ///
 /// Coverage holds by exchangeability: a new movement is as likely as each held-out one to have the larger error
@@ -50,10 +64,12 @@ impl Calibration {
     /// # Errors
     /// A factor is not.
     pub(crate) fn check(&self) -> Result<()> {
-        let of = |&BandFactors { position, goal, duration, misfit }: &BandFactors| [position, goal, duration, misfit];
         let valid = |factor: f64| (1e-100..=1e100).contains(&factor);
         let allowed = "must lie between 1e-100 and 1e100";
-        self.0.iter().flat_map(of).try_for_each(|factor| check_range("calibration", factor, valid(factor), allowed))
+        self.0
+            .into_iter()
+            .flat_map(<[f64; 4]>::from)
+            .try_for_each(|factor| check_range("calibration", factor, valid(factor), allowed))
     }
 
     /// Returns the factors at a share, linear between the measured ones and constant beyond.

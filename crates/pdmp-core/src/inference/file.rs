@@ -64,14 +64,17 @@ impl Prior {
 
     fn section(&self) -> Section {
         let Settings { bandwidth, tempering, correlation_time } = self.settings();
-        let of = |&BandFactors { position, goal, duration, misfit }: &BandFactors| [position, goal, duration, misfit];
         let (parameters, n_demos) = (self.parameters(), self.n_demos());
         Section::new(SCHEMA)
             .with_array("parameters", parameters.shape(), parameters.iter().copied().collect())
             .with_array("log_durations", &[n_demos], self.log_durations().to_vec())
             .with_array("residual", &[self.residual().len()], self.residual().to_vec())
             .with_array("settings", &[3], vec![bandwidth, tempering, correlation_time])
-            .with_array("calibration", &[SHARES.len(), 4], self.calibration().0.iter().flat_map(of).collect())
+            .with_array(
+                "calibration",
+                &[SHARES.len(), 4],
+                self.calibration().0.into_iter().flat_map(<[f64; 4]>::from).collect(),
+            )
     }
 
     /// Reads the prior from the bytes of a model file.
@@ -93,10 +96,7 @@ impl Prior {
         let settings = Settings { bandwidth: settings[0], tempering: settings[1], correlation_time: settings[2] };
         let factors = section.take_array("calibration", &[SHARES.len(), 4])?;
         section.close()?;
-        let factors = |share: usize| {
-            let [position, goal, duration, misfit] = [0, 1, 2, 3].map(|k| factors[4 * share + k]);
-            BandFactors { position, goal, duration, misfit }
-        };
+        let factors = |share: usize| BandFactors::from([0, 1, 2, 3].map(|k| factors[4 * share + k]));
         let calibration = Calibration(std::array::from_fn(factors));
         Self::new(model.kind(), parameters, log_durations, residual, settings, calibration).map_err(unreadable)
     }

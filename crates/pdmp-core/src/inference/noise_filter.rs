@@ -24,8 +24,11 @@ impl NoiseFilter {
     /// Returns the filter before the first observation of residuals with standard deviations (D,).
     pub(crate) fn new(residual: &[f64], correlation_time: f64) -> Self {
         let variances: Vec<f64> = residual.iter().map(|sd| sd * sd).collect();
-        let uncertain = variances.iter().map(|variance| (1.0 - WHITE) * variance).collect();
-        Self { correlation_time, uncertain, decay: 0.0, gains: vec![None; variances.len()], variances }
+        let n = variances.len();
+        let mut filter =
+            Self { correlation_time, variances, uncertain: vec![0.0; n], decay: 0.0, gains: vec![None; n] };
+        filter.restart();
+        filter
     }
 
     /// Returns to the state before the first observation, without allocation.
