@@ -167,11 +167,12 @@ pub unsafe extern "C" fn pdmp_model_through(
             (points, options, given)
         };
         // Conditions have a tau here, and no durations of segments.
-        let mean = match &options.prediction {
-            Some(prediction) => prediction.conditions.time_constant(model),
-            None => model.conditions(&(0..model.n_demos()).collect::<Vec<_>>())?.time_constant(model),
+        let tau = match (given.tau, &options.prediction) {
+            (Some(tau), _) => tau,
+            (None, Some(prediction)) => prediction.conditions.time_constant(model)?,
+            (None, None) => model.conditions(&(0..model.n_demos()).collect::<Vec<_>>())?.time_constant(model)?,
         };
-        let given = Conditions { tau: Some(given.tau.map_or(mean, Ok)?), ..given };
+        let given = Conditions { tau: Some(tau), ..given };
         let inner = through(model, &points, &given, &options)?;
         *handle = Box::into_raw(Box::new(pdmp_passage { inner }));
         Ok(PDMP_OK)

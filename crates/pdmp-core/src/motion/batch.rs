@@ -94,7 +94,8 @@ pub fn batch(
     let coordinates = outside.coordinates();
     let in_dofs = coordinates.map(|coordinates| conditions.clone().in_dofs(coordinates)).transpose()?;
     let checked = in_dofs.as_ref().unwrap_or(&conditions);
-    let (n_movements, tau) = (checked.check(primitive)?, checked.common_tau(primitive)?);
+    let n_movements = checked.check(primitive)?;
+    let tau = checked.common_tau(primitive, n_movements)?;
     let singles = match tau {
         Some(_) => None,
         None => Some(Singles::new(outside, conditions.movements(n_movements), grid)?),
@@ -106,14 +107,13 @@ pub fn batch(
         Some(singles) => singles.n_samples()?,
         None => grid.steps(primitive, nominal.tau)? + 1,
     };
-    let responses = match (&singles, &forcing) {
-        (Some(_), _) => Arc::new(Responses::none()),
-        (None, None) => responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?,
-        (None, Some(forcing)) => {
-            let responses = responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?;
-            Arc::new(responses.with_forcing(forcing, grid.dt / nominal.tau, 1.0 / nominal.tau))
-        }
+    let mut responses = match &singles {
+        Some(_) => Arc::new(Responses::none()),
+        None => responses(primitive, nominal.tau, goal_velocity.is_some(), grid, progress)?,
     };
+    if let (None, Some(forcing)) = (&singles, &forcing) {
+        responses = Arc::new(responses.with_forcing(forcing, grid.dt / nominal.tau, 1.0 / nominal.tau));
+    }
     Ok(Batch {
         singles,
         n_samples,

@@ -250,7 +250,7 @@ impl BatchConditions {
             }
         }
         let n_movements = n_movements.unwrap_or(1);
-        for b in 0..n_movements {
+        for b in 0..self.n_timings(n_movements) {
             let one = self.timing(b);
             reject_for_kind(kind, "amplitude", kind == Kind::Discrete && one.amplitude.is_some())?;
             one.amplitude.map_or(Ok(()), check_amplitude)?;
@@ -274,6 +274,12 @@ impl BatchConditions {
             ("segment_durations", &self.segment_durations),
             ("phase", &self.phase),
         ]
+    }
+
+    /// Returns the number of movements, of `n`, from which on the timings repeat: one if all have the same.
+    fn n_timings(&self, n: usize) -> usize {
+        let vectors = [&self.amplitude, &self.tau, &self.segment_durations, &self.phase];
+        if vectors.iter().any(|vectors| matches!(vectors, Some(PerMovement::Each(_)))) { n } else { n.min(1) }
     }
 
     /// Returns amplitude, time constant or segment durations, and phase of movement `b`.
@@ -305,14 +311,10 @@ impl BatchConditions {
         (0..n).map(of).collect()
     }
 
-    /// Returns the τ of all movements, which then have response curves in common: linear time from phase 0.
-    pub(super) fn common_tau(&self, primitive: &Primitive) -> Result<Option<f64>> {
-        let n_movements = self.named().iter().find_map(|(_, vectors)| match vectors {
-            Some(PerMovement::Each(rows)) => Some(rows.nrows()),
-            _ => None,
-        });
+    /// Returns the τ of all `n` movements, which then have response curves in common: linear time from phase 0.
+    pub(super) fn common_tau(&self, primitive: &Primitive, n: usize) -> Result<Option<f64>> {
         let mut common = None;
-        for b in 0..n_movements.unwrap_or(1) {
+        for b in 0..self.n_timings(n) {
             let one = self.timing(b);
             let is_warped = one.segment_durations.as_ref().is_some_and(|durations| durations.len() > 1);
             let tau = one.time_constant(primitive)?;

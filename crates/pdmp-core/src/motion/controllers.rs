@@ -1,5 +1,6 @@
 //! Many movements of one primitive, stepped together.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
@@ -98,8 +99,8 @@ impl Controllers {
     /// A mask or outputs of a wrong length, or a tick longer than 1000 τ of a movement. No movement is changed then.
     pub fn step(&mut self, mask: Option<&[bool]>, motions: &mut Motions) -> Result<()> {
         self.check(mask, motions)?;
-        for b in self.unsteady() {
-            if is_selected(mask, b) {
+        for b in self.searched() {
+            if !self.steady.holds(b) && is_selected(mask, b) {
                 self.controllers[b].check_tick_length(self.dt(), None)?;
             }
         }
@@ -320,8 +321,7 @@ impl Controllers {
             self.leave(self.ending[i] as usize);
         }
         let (n_coordinates, n_dofs) = (self.primitive().n_coordinates(), self.primitive().n_dofs());
-        let n = if self.steady.len() < self.len() { self.len() } else { 0 };
-        for b in 0..n {
+        for b in self.searched() {
             if self.steady.holds(b) || !is_selected(mask, b) {
                 continue;
             }
@@ -337,10 +337,9 @@ impl Controllers {
         Ok(())
     }
 
-    /// Returns the movements that are not steady.
-    fn unsteady(&self) -> impl Iterator<Item = usize> {
-        let n = if self.steady.len() < self.len() { self.len() } else { 0 };
-        (0..n).filter(|&b| !self.steady.holds(b))
+    /// Returns the movements to search for those that are not steady: none if all are.
+    fn searched(&self) -> Range<usize> {
+        0..if self.steady.len() < self.len() { self.len() } else { 0 }
     }
 
     /// Checks the lengths of a mask and of outputs.
