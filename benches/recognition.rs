@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use control_loop::is_benchmark;
 use ndarray::{Array2, Axis, concatenate};
-use pdmp_core::inference::{Calibration, Prior, Recogniser, Settings, Timing};
+use pdmp_core::inference::{Calibration, Mixture, Prior, Recogniser, Settings, Timing};
 use pdmp_core::learning::Truncation;
 use pdmp_core::{Demonstration, FitOptions, Kind, Model, Sampling, fit};
 use random::Random;
@@ -46,9 +46,10 @@ fn prior(model: &Model, bandwidth: f64) -> Prior {
     let shown = model.demonstrated();
     let parameters = [shown.styles.view(), shown.goals.view(), shown.starts.view()];
     let parameters = concatenate(Axis(1), &parameters).expect("rows of the demonstrations");
-    let logs = shown.durations.iter().map(|duration| duration.ln()).collect();
+    let log_durations = shown.durations.iter().map(|duration| duration.ln()).collect();
     let settings = Settings { bandwidth, tempering: 0.1, correlation_time: 0.15 };
-    Prior::new(Kind::Discrete, parameters, logs, vec![0.05; N_DOFS], settings, Calibration::NONE).expect("valid")
+    let mixture = Mixture { parameters, log_durations, settings, calibration: Calibration::NONE };
+    Prior::new(Kind::Discrete, mixture, vec![0.05; N_DOFS]).expect("valid")
 }
 
 /// Kalman filters of one vector of parameters (K,) for each hypothesis, with the gain of the textbook.

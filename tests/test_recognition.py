@@ -150,6 +150,35 @@ def test_a_partner_that_is_not_seen_follows_from_the_other():
     assert np.abs(ahead.position - new.position[31:]).max() < 0.08
 
 
+def test_a_context_says_where_a_movement_goes():
+    """In a given context the movement is known before it begins; pickles and files keep that."""
+    rng = np.random.default_rng(4)
+    heights = rng.uniform(0.1, 0.5, 12)
+    demos = [reach(height, 0.3 + height, 0.8 + height) for height in heights]
+    model = pdmp.fit(demos, contexts={"height": heights})
+    prior = model.prior(demos)
+    new = reach(0.33, 0.63, 1.13)
+    given = watched(model.recogniser(prior, context={"height": 0.33}), new, 3)
+    without = watched(model.recogniser(prior), new, 3)
+
+    def error(recogniser):
+        return np.abs(recogniser.continuation(new.time[3:]).position - new.position[3:]).max()
+
+    assert error(given) < 0.01
+    assert error(given) < 0.4 * error(without)
+    same = [pickle.loads(pickle.dumps(prior)), pdmp.Prior.from_bytes(model.to_bytes(prior=prior))]
+    for each in same:
+        again = watched(model.recogniser(each, context=[0.33]), new, 3)
+        np.testing.assert_array_equal(again.estimate().goal, given.estimate().goal)
+    with pytest.raises(ValueError, match="context"):
+        model.recogniser(prior, context=[0.3, 0.4])
+    with pytest.raises((ValueError, KeyError), match="length"):
+        model.recogniser(prior, context={"length": 0.3})
+    bare = pdmp.fit(demos)
+    with pytest.raises(ValueError, match="context.*contexts"):
+        bare.recogniser(bare.prior(demos), context=[0.3])
+
+
 def test_a_prior_is_the_same_after_a_pickle(model, prior):
     """A pickled prior gives the same estimates, bit for bit."""
     same = pickle.loads(pickle.dumps(prior))

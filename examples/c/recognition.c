@@ -31,7 +31,8 @@ int main(int argc, char **argv) {
     pdmp_model *model;
     pdmp_recogniser *recogniser;
     if (pdmp_model_load(argv[1], &model, error) < 0) return fail(message);
-    if (pdmp_recogniser_load(argv[1], NULL, &recogniser, error) < 0) return fail(message);
+    const pdmp_vector no_context = {NULL, 0};
+    if (pdmp_recogniser_load(argv[1], no_context, NULL, &recogniser, error) < 0) return fail(message);
     pdmp_info info;
     pdmp_model_describe(model, &info);
     if (info.kind != PDMP_DISCRETE) return fail("the model is rhythmic: it has no goal");

@@ -1895,7 +1895,7 @@ class Model:
         Recognition of held-out demonstrations is simulated: up to ten folds are held out in turn, the model is fitted again
         without each, and the rest of the held-out movements is predicted after 10, 30, 50 and 70 % of them. Bandwidth,
         exponent of the likelihood and correlation time of the residual are those with the smallest error; the bands are
-        scaled to hold 90 % of the errors.
+        scaled to hold 90 % of the errors. With contexts, recognition in a given context is simulated as well.
 
         Parameters
         ----------
@@ -1944,6 +1944,8 @@ class Model:
         ----------
         prior : Prior
             Prior of the movement, from `prior`.
+        context : array_like, (Q,), or mapping, optional
+            Context of the movement, if it is known: the prior is then that of movements in this context.
         starts : (float, float), optional
             Earliest and latest start of a discrete movement, in s from the first observation; a negative one is a movement
             joined on its way. By default it starts with the first observation. A rhythmic one is joined at any phase.
@@ -1957,7 +1959,8 @@ class Model:
         Raises
         ------
         ValueError
-            The prior is of another model, or a time is out of range.
+            The prior is of another model or, with `context`, of a model without contexts; the context has another length or an
+            unknown label; or a time is out of range.
         TypeError
             An argument has another type.
 
@@ -2769,6 +2772,10 @@ class Prior:
     mean, so that the mixture keeps mean and covariance of the demonstrations::
 
         p(θ, log T) = 1/M Σₘ N(μ + √(1−c²)(θₘ − μ), c²Σ)
+
+    The prior of a model with contexts has a form for a given context h too, in which the kernels are on the prediction θ(h)
+    plus the deviation of each demonstration from the prediction by the others, θ'ₘ = θ(h) + θₘ − θ₋ₘ(hₘ). Settings and
+    bands of both forms are learnt apart; the attributes are those of the form without a context.
 
     Priors are immutable and can be pickled. `Model.save` keeps a prior in the file of its model.
     """

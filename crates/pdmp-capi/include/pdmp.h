@@ -653,14 +653,18 @@ void pdmp_passage_free(pdmp_passage *passage);
 pdmp_status pdmp_controller_add_forcing(pdmp_controller *controller,
                                         const pdmp_passage *passage);
 
-/// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string; `timing` may be NULL.
+/// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string; `timing` may be NULL. `context` (n_contexts) is
+/// the context of the movement, as for pdmp_model_predict: the prior is then that of movements in this context. With a NULL
+/// pointer it is not known.
 ///
 /// `*recogniser` is set to the new recogniser, which the caller frees with pdmp_recogniser_free, or to NULL on error. The
 /// degrees of freedom are those of the model, which pdmp_model_load reads from the same file.
 ///
-/// Errors: PDMP_NULL; PDMP_IO; PDMP_FILE, also for a model file without a prior; PDMP_RANGE for times that are not finite or in
+/// Errors: PDMP_NULL; PDMP_IO; PDMP_FILE, also for a model file without a prior; PDMP_LENGTH; PDMP_ABSENT for a context if the model
+/// was fitted without contexts; PDMP_RANGE for a context as for pdmp_model_predict, or times that are not finite or in
 /// the wrong order, or a model with rotations or a time warp.
 pdmp_status pdmp_recogniser_load(const char *path,
+                                 pdmp_vector context,
                                  const pdmp_timing *timing,
                                  pdmp_recogniser **recogniser,
                                  pdmp_text error);
@@ -668,9 +672,10 @@ pdmp_status pdmp_recogniser_load(const char *path,
 /// Creates a recogniser from the `size` bytes of a model file with a prior, as pdmp_recogniser_load does. The bytes may be freed
 /// afterwards.
 ///
-/// Errors: PDMP_NULL, PDMP_FILE, PDMP_RANGE.
+/// Errors: PDMP_NULL, PDMP_FILE, PDMP_LENGTH, PDMP_ABSENT, PDMP_RANGE.
 pdmp_status pdmp_recogniser_from_bytes(const void *bytes,
                                        size_t size,
+                                       pdmp_vector context,
                                        const pdmp_timing *timing,
                                        pdmp_recogniser **recogniser,
                                        pdmp_text error);

@@ -399,17 +399,18 @@ struct Continuation {
 /// Filter that estimates a movement while it is observed. One thread at a time may use it.
 class Recogniser {
 public:
-    /// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string.
-    static Recogniser load(const std::string &path, const Timing &timing = {}) {
+    /// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string. An empty `context` is not known.
+    static Recogniser load(const std::string &path, const Timing &timing = {}, const std::vector<double> &context = {}) {
         return Recogniser(timing, [&](const pdmp_timing *t, pdmp_recogniser **made, pdmp_text error) {
-            return pdmp_recogniser_load(path.c_str(), t, made, error);
+            return pdmp_recogniser_load(path.c_str(), detail::to_c(context), t, made, error);
         });
     }
 
     /// Creates a recogniser from the `size` bytes of a model file with a prior.
-    static Recogniser from_bytes(const void *bytes, std::size_t size, const Timing &timing = {}) {
+    static Recogniser from_bytes(const void *bytes, std::size_t size, const Timing &timing = {},
+                                 const std::vector<double> &context = {}) {
         return Recogniser(timing, [&](const pdmp_timing *t, pdmp_recogniser **made, pdmp_text error) {
-            return pdmp_recogniser_from_bytes(bytes, size, t, made, error);
+            return pdmp_recogniser_from_bytes(bytes, size, detail::to_c(context), t, made, error);
         });
     }
 

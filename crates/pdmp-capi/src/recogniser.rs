@@ -11,6 +11,7 @@ use crate::buffers::{bytes_of, path_of, pdmp_buffer, pdmp_text, pdmp_vector};
 use crate::command::pdmp_conditions;
 use crate::fault::Fault;
 use crate::guard::{guard, guard_with_text};
+use crate::model::n_contexts;
 use crate::status::pdmp_status;
 
 use pdmp_status::PDMP_OK;
@@ -73,8 +74,10 @@ pub struct pdmp_estimate {
 /// Writes a pointer to a new recogniser to `recogniser`, or NULL on error.
 ///
 /// # Safety
-/// `error.data` is NULL or points to at least `error.size` writable bytes, and `timing.duration` is NULL or valid.
+/// `error.data` is NULL or points to at least `error.size` writable bytes, `context.data` is NULL or points to `context.size`
+/// numbers, and `timing.duration` is NULL or valid.
 unsafe fn create(
+    context: pdmp_vector,
     timing: Option<&pdmp_timing>,
     recogniser: Option<&mut MaybeUninit<*mut pdmp_recogniser>>,
     error: pdmp_text,
@@ -83,6 +86,15 @@ unsafe fn create(
     let call = || {
         let handle = recogniser.ok_or(Fault::Null("recogniser"))?.write(ptr::null_mut());
         let (model, prior) = load()?;
+        let prior = match model.map() {
+            _ if context.data.is_null() => prior,
+            None => return Err(Fault::NoContexts),
+            Some(map) => {
+                // SAFETY: this function has the same contract for `context`.
+                let context = unsafe { context.require("context", n_contexts(&model), "context value") }?;
+                prior.given(&model, &map.context(context)?)?
+            }
+        };
         let timing = timing.map_or(Timing::default(), |timing| Timing {
             starts: [timing.earliest, timing.latest],
             // SAFETY: the caller guarantees that the pointer is NULL or valid.
@@ -98,16 +110,20 @@ unsafe fn create(
     unsafe { guard_with_text(error, call) }
 }
 
-/// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string; `timing` may be NULL.
+/// Creates a recogniser from a model file with a prior. `path` is a UTF-8 string; `timing` may be NULL. `context` (n_contexts) is
+/// the context of the movement, as for pdmp_model_predict: the prior is then that of movements in this context. With a NULL
+/// pointer it is not known.
 ///
 /// `*recogniser` is set to the new recogniser, which the caller frees with pdmp_recogniser_free, or to NULL on error. The
 /// degrees of freedom are those of the model, which pdmp_model_load reads from the same file.
 ///
-/// Errors: PDMP_NULL; PDMP_IO; PDMP_FILE, also for a model file without a prior; PDMP_RANGE for times that are not finite or in
+/// Errors: PDMP_NULL; PDMP_IO; PDMP_FILE, also for a model file without a prior; PDMP_LENGTH; PDMP_ABSENT for a context if the model
+/// was fitted without contexts; PDMP_RANGE for a context as for pdmp_model_predict, or times that are not finite or in
 /// the wrong order, or a model with rotations or a time warp.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_recogniser_load(
     path: *const c_char,
+    context: pdmp_vector,
     timing: Option<&pdmp_timing>,
     recogniser: Option<&mut MaybeUninit<*mut pdmp_recogniser>>,
     error: pdmp_text,
@@ -117,18 +133,19 @@ pub unsafe extern "C" fn pdmp_recogniser_load(
         let path = unsafe { path_of(path) }?;
         Ok((Model::load(path)?, Prior::load(path)?))
     };
-    // SAFETY: the contract of the C ABI covers `timing` and `error`.
-    unsafe { create(timing, recogniser, error, load) }
+    // SAFETY: the contract of the C ABI covers `context`, `timing` and `error`.
+    unsafe { create(context, timing, recogniser, error, load) }
 }
 
 /// Creates a recogniser from the `size` bytes of a model file with a prior, as pdmp_recogniser_load does. The bytes may be freed
 /// afterwards.
 ///
-/// Errors: PDMP_NULL, PDMP_FILE, PDMP_RANGE.
+/// Errors: PDMP_NULL, PDMP_FILE, PDMP_LENGTH, PDMP_ABSENT, PDMP_RANGE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_recogniser_from_bytes(
     bytes: *const c_void,
     size: usize,
+    context: pdmp_vector,
     timing: Option<&pdmp_timing>,
     recogniser: Option<&mut MaybeUninit<*mut pdmp_recogniser>>,
     error: pdmp_text,
@@ -138,8 +155,8 @@ pub unsafe extern "C" fn pdmp_recogniser_from_bytes(
         let bytes = unsafe { bytes_of(bytes, size) }?;
         Ok((Model::from_bytes(bytes)?, Prior::from_bytes(bytes)?))
     };
-    // SAFETY: the contract of the C ABI covers `timing` and `error`.
-    unsafe { create(timing, recogniser, error, load) }
+    // SAFETY: the contract of the C ABI covers `context`, `timing` and `error`.
+    unsafe { create(context, timing, recogniser, error, load) }
 }
 
 /// Frees a recogniser; NULL is ignored.

@@ -229,7 +229,7 @@ fn recognition_matches_rust_to_the_bit_and_allocates_nothing() {
         // SAFETY: every pointer is valid, and the library allocates a recogniser as a `Box`.
         let mut c = unsafe {
             let (data, size) = (bytes.as_ptr().cast(), bytes.len());
-            let status = pdmp_recogniser_from_bytes(data, size, Some(&c_timing), Some(&mut made), none);
+            let status = pdmp_recogniser_from_bytes(data, size, vector(None), Some(&c_timing), Some(&mut made), none);
             assert_eq!(status, pdmp_status::PDMP_OK);
             Box::from_raw(made.assume_init())
         };

@@ -251,9 +251,9 @@ fn null_for_a_required_argument_is_an_error() {
             pdmp_passage_describe(None, None),
             pdmp_controller_add_forcing(None, None),
             pdmp_controller_add_forcing(running.handle(), None),
-            pdmp_recogniser_load(ptr::null(), None, Some(&mut watching), NO_TEXT),
-            pdmp_recogniser_load(c"absent".as_ptr(), None, None, NO_TEXT),
-            pdmp_recogniser_from_bytes(ptr::null(), 8, None, Some(&mut watching), NO_TEXT),
+            pdmp_recogniser_load(ptr::null(), NO_VECTOR, None, Some(&mut watching), NO_TEXT),
+            pdmp_recogniser_load(c"absent".as_ptr(), NO_VECTOR, None, None, NO_TEXT),
+            pdmp_recogniser_from_bytes(ptr::null(), 8, NO_VECTOR, None, Some(&mut watching), NO_TEXT),
             pdmp_recogniser_update(None, 0.0, NO_VECTOR),
             pdmp_recogniser_estimate(None, None),
             pdmp_recogniser_continuation(None, NO_VECTOR, NO_BUFFER, NO_BUFFER),
@@ -1039,11 +1039,14 @@ fn bad_observations_are_refused_with_a_message() {
     let demos = reaches();
     let model = learn(&demos, &options(Kind::Discrete));
     let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
-    let new = |bytes: &[u8], timing: Option<&pdmp_timing>| {
+    let create = |bytes: &[u8], context: pdmp_vector, timing: Option<&pdmp_timing>| {
         let mut made = MaybeUninit::uninit();
         let (status, text) = with_text(256, |error| {
             // SAFETY: every pointer is valid.
-            unsafe { pdmp_recogniser_from_bytes(bytes.as_ptr().cast(), bytes.len(), timing, Some(&mut made), error) }
+            unsafe {
+                let (data, made) = (bytes.as_ptr().cast(), Some(&mut made));
+                pdmp_recogniser_from_bytes(data, bytes.len(), context, timing, made, error)
+            }
         });
         // SAFETY: the recogniser is written on success and on error, and the library allocates it as a `Box`.
         let made = unsafe { made.assume_init() };
@@ -1051,6 +1054,7 @@ fn bad_observations_are_refused_with_a_message() {
         // SAFETY: as above.
         (status, text, (!made.is_null()).then(|| unsafe { Box::from_raw(made) }))
     };
+    let new = |bytes: &[u8], timing: Option<&pdmp_timing>| create(bytes, NO_VECTOR, timing);
     let (status, text, _) = new(&model.to_bytes().unwrap(), None);
     assert!(status == PDMP_FILE && text.contains("no prior"), "{status:?} {text}");
     let bytes = prior.to_bytes(&model).unwrap();
@@ -1058,6 +1062,8 @@ fn bad_observations_are_refused_with_a_message() {
     let timing = pdmp_timing { earliest: 1.0, latest: 0.0, duration: ptr::null() };
     let (status, text, _) = new(&bytes, Some(&timing));
     assert!(status == PDMP_RANGE && text.contains("starts"), "{status:?} {text}");
+    let context = |numbers: &[f64]| create(&bytes, pdmp_vector { data: numbers.as_ptr(), length: numbers.len() }, None).0;
+    assert_eq!([context(&[0.2, 0.3]), context(&[f64::NAN])], [PDMP_LENGTH, PDMP_RANGE]);
 
     let mut recogniser = new(&bytes, None).2.unwrap();
     let mut estimate = MaybeUninit::uninit();

@@ -165,6 +165,9 @@ int main(int, char **argv) try {
     REQUIRE(recogniser.reset() == PDMP_OK && watch(recogniser).goal == seen.goal);
     auto other = pdmp::Recogniser::load(argv[1]);
     pdmp::Controller following(model, 0.002, watch(other));
+    auto given = pdmp::Recogniser::load(argv[1], {}, {0.2});
+    REQUIRE(std::abs(watch(given).goal[0] - model.demonstration(2).goal[0]) < 0.05);
+    REQUIRE(status_thrown_by([&] { pdmp::Recogniser::load(argv[1], {}, {0.2, 0.3}); }) == PDMP_LENGTH);
     REQUIRE(following.step() == PDMP_WORKING);
 
     const auto rollout = model.rollout(model.predict({0.2}), 0.01, 40);

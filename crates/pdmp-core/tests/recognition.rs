@@ -204,3 +204,52 @@ fn bad_observations_are_refused() {
     }
     assert!(Recogniser::new(&model, &prior, Timing { duration: Some(0.0), ..Timing::default() }).is_err());
 }
+
+/// In a given context, a movement is known before it begins, and its prior is another one than without.
+#[test]
+fn a_context_says_where_a_movement_goes() {
+    // The context is the height.
+    let (model, prior) = learnt(&recordings(), Kind::Discrete);
+    let new = reach(0.33, 1.1, 0.01);
+    let error = |prior: &Prior| {
+        let mut recogniser =
+            Recogniser::new(&model, prior, Timing { duration: Some(1.1), ..Timing::default() }).unwrap();
+        for k in 0..3 {
+            recogniser.update(0.01 * f64::from(k), &new.position().row(k as usize).to_vec()).unwrap();
+        }
+        let time: Vec<f64> = (3..new.n_samples()).map(|k| 0.01 * k as f64).collect();
+        let rest = recogniser.continuation(&time).unwrap().position;
+        (&rest - &new.position().slice(ndarray::s![3.., ..])).iter().map(|x| x * x).sum::<f64>().sqrt()
+    };
+    let (given, other) = (prior.given(&model, &[0.33]).unwrap(), prior.given(&model, &[0.05]).unwrap());
+    assert!(error(&given) < 0.3 * error(&prior), "{} {}", error(&given), error(&prior));
+    assert!(error(&given) < 0.1 * error(&other), "{} {}", error(&given), error(&other));
+    // Kernels are about the prediction plus the deviations.
+    let (prediction, deviations) = (model.predict(&[0.33]).unwrap(), prior.deviations().unwrap());
+    let style = prediction.conditions.style.unwrap();
+    for (own, deviation) in given.parameters().rows().into_iter().zip(deviations.parameters.rows()) {
+        assert!(style.iter().enumerate().all(|(j, s)| (own[j] - s - deviation[j]).abs() < 1e-12));
+    }
+    let restored = Prior::from_bytes(&prior.to_bytes(&model).unwrap()).unwrap();
+    assert_eq!(restored.given(&model, &[0.33]).unwrap(), given);
+    assert!(given.given(&model, &[0.33]).unwrap_err().to_string().contains("no contexts"));
+    assert!(prior.given(&model, &[0.33, 0.1]).is_err(), "two numbers");
+    let bare = |demo: Demonstration| Demonstration::new(demo.position().to_owned(), demo.sampling().clone()).unwrap();
+    let (bare, without) = learnt(&recordings().into_iter().map(bare).collect::<Vec<_>>(), Kind::Discrete);
+    assert!(without.deviations().is_none() && without.given(&bare, &[0.33]).is_err(), "a model without contexts");
+}
+
+/// Labels of which each has one movement say nothing of a new one, so that the prior has none for them; of two movements
+/// each they do.
+#[test]
+fn labels_need_two_movements_each() {
+    let labelled = |n: usize| -> Vec<Demonstration> {
+        let of = |(k, demo): (usize, Demonstration)| demo.with_context(vec![format!("{}", k % n).as_str()]).unwrap();
+        recordings().into_iter().enumerate().map(of).collect()
+    };
+    let (_, alone) = learnt(&labelled(12), Kind::Discrete);
+    assert!(alone.deviations().is_none());
+    let (model, several) = learnt(&labelled(3), Kind::Discrete);
+    assert!(several.given(&model, &["1"]).is_ok());
+    assert!(several.given(&model, &["7"]).unwrap_err().to_string().contains("labels are"), "a label that is not shown");
+}

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use pdmp_core::inference::{BandFactors, Calibration, Settings};
+use pdmp_core::inference::{BandFactors, Calibration, Mixture, Settings};
 use pdmp_core::learning::learn_prior;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyDictMethods};
+use pyo3::types::{PyDict, PyDictMethods, PyTuple};
 
 use crate::convert::{Matrix, Reduced, Vector, items, locked, matrix, quoted, read_only, threads, vector};
 use crate::error::raise;
@@ -21,6 +21,10 @@ use crate::scalar::Scalar;
 ///
 ///     p(θ, log T) = 1/M Σₘ N(μ + √(1−c²)(θₘ − μ), c²Σ)
 ///
+/// The prior of a model with contexts has a form for a given context h too, in which the kernels are on the prediction θ(h)
+/// plus the deviation of each demonstration from the prediction by the others, θ'ₘ = θ(h) + θₘ − θ₋ₘ(hₘ). Settings and
+/// bands of both forms are learnt apart; the attributes are those of the form without a context.
+///
 /// Priors are immutable and can be pickled. `Model.save` keeps a prior in the file of its model.
 #[pyclass(frozen, module = "pdmp")]
 pub(crate) struct Prior(pub(crate) pdmp_core::inference::Prior);
@@ -31,35 +35,24 @@ impl Prior {
     #[staticmethod]
     fn _of(
         rhythmic: bool,
-        parameters: &Bound<'_, PyAny>,
-        log_durations: &Bound<'_, PyAny>,
+        mixture: &Bound<'_, PyAny>,
         residual: &Bound<'_, PyAny>,
-        settings: [f64; 3],
-        factors: [[f64; 4]; 4],
+        deviations: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let kind = if rhythmic { pdmp_core::Kind::Rhythmic } else { pdmp_core::Kind::Discrete };
-        let [bandwidth, tempering, correlation_time] = settings;
-        let settings = Settings { bandwidth, tempering, correlation_time };
-        let parameters = matrix("parameters", "(M, K)", parameters)?;
-        let (durations, residual) = (vector("log_durations", log_durations)?, vector("residual", residual)?);
-        let calibration = Calibration(factors.map(BandFactors::from));
-        pdmp_core::inference::Prior::new(kind, parameters, durations, residual, settings, calibration)
-            .map(Self)
-            .map_err(raise)
+        let residual = vector("residual", residual)?;
+        let prior = pdmp_core::inference::Prior::new(kind, unpickled(mixture)?, residual).map_err(raise)?;
+        match deviations {
+            Some(deviations) => prior.with_deviations(unpickled(deviations)?).map(Self).map_err(raise),
+            None => Ok(Self(prior)),
+        }
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         let prior = &self.0;
-        let Settings { bandwidth, tempering, correlation_time } = prior.settings();
-        let factors = prior.calibration().0.map(<[f64; 4]>::from);
-        let arguments = (
-            prior.kind() == pdmp_core::Kind::Rhythmic,
-            self.parameters(py),
-            read_only(py, prior.log_durations()),
-            self.residual(py),
-            [bandwidth, tempering, correlation_time],
-            factors,
-        );
+        let deviations = prior.deviations().map(|deviations| pickled(py, deviations)).transpose()?;
+        let rhythmic = prior.kind() == pdmp_core::Kind::Rhythmic;
+        let arguments = (rhythmic, pickled(py, prior.mixture())?, self.residual(py), deviations);
         Ok((py.get_type::<Self>().getattr("_of")?, arguments.into_pyobject(py)?))
     }
 
@@ -151,6 +144,28 @@ impl Prior {
     }
 }
 
+/// Returns the parts of a mixture in a pickled prior.
+fn pickled<'py>(py: Python<'py>, mixture: &Mixture) -> PyResult<Bound<'py, PyTuple>> {
+    let Settings { bandwidth, tempering, correlation_time } = mixture.settings;
+    let factors = mixture.calibration.0.map(<[f64; 4]>::from);
+    let parameters = numpy::PyArray2::from_array(py, &mixture.parameters);
+    let logs = read_only(py, &mixture.log_durations);
+    (parameters, logs, [bandwidth, tempering, correlation_time], factors).into_pyobject(py)
+}
+
+/// Returns the mixture of parts.
+fn unpickled(parts: &Bound<'_, PyAny>) -> PyResult<Mixture> {
+    let (parameters, logs, settings, factors): (Bound<'_, PyAny>, Bound<'_, PyAny>, [f64; 3], [[f64; 4]; 4]) =
+        parts.extract()?;
+    let [bandwidth, tempering, correlation_time] = settings;
+    Ok(Mixture {
+        parameters: matrix("parameters", "(M, K)", &parameters)?,
+        log_durations: vector("log_durations", &logs)?,
+        settings: Settings { bandwidth, tempering, correlation_time },
+        calibration: Calibration(factors.map(BandFactors::from)),
+    })
+}
+
 #[pymethods]
 impl Model {
     /// Learns the prior of style, goal, start or anchor, and duration from the demonstrations of the fit.
@@ -158,7 +173,7 @@ impl Model {
     /// Recognition of held-out demonstrations is simulated: up to ten folds are held out in turn, the model is fitted again
     /// without each, and the rest of the held-out movements is predicted after 10, 30, 50 and 70 % of them. Bandwidth,
     /// exponent of the likelihood and correlation time of the residual are those with the smallest error; the bands are
-    /// scaled to hold 90 % of the errors.
+    /// scaled to hold 90 % of the errors. With contexts, recognition in a given context is simulated as well.
     ///
     /// Parameters
     /// ----------

@@ -11,6 +11,7 @@ use crate::convert::{refill, to_numpy, vector};
 use crate::error::raise;
 use crate::instance;
 use crate::model::Model;
+use crate::named_contexts::context_for;
 use crate::scalar::{Scalar, optional_number};
 
 /// Estimate of a movement from a part of it, returned by `Recogniser.estimate`.
@@ -192,6 +193,8 @@ impl Model {
     /// ----------
     /// prior : Prior
     ///     Prior of the movement, from `prior`.
+    /// context : array_like, (Q,), or mapping, optional
+    ///     Context of the movement, if it is known: the prior is then that of movements in this context.
     /// starts : (float, float), optional
     ///     Earliest and latest start of a discrete movement, in s from the first observation; a negative one is a movement
     ///     joined on its way. By default it starts with the first observation. A rhythmic one is joined at any phase.
@@ -205,7 +208,8 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     The prior is of another model, or a time is out of range.
+    ///     The prior is of another model or, with `context`, of a model without contexts; the context has another length or an
+    ///     unknown label; or a time is out of range.
     /// TypeError
     ///     An argument has another type.
     ///
@@ -219,10 +223,11 @@ impl Model {
     /// >>> bool(np.abs(estimate.goal - demos[0].position[-1]).max() < 0.2)
     /// True
     /// >>> rest = model.rollout(dt=0.01, conditions=estimate.conditions)
-    #[pyo3(signature = (prior, *, starts=None, duration=None))]
+    #[pyo3(signature = (prior, *, context=None, starts=None, duration=None))]
     fn recogniser(
         &self,
         prior: &Bound<'_, PyAny>,
+        context: Option<&Bound<'_, PyAny>>,
         starts: Option<&Bound<'_, PyAny>>,
         duration: Option<Scalar<'_>>,
     ) -> PyResult<Recogniser> {
@@ -233,6 +238,9 @@ impl Model {
             timing.starts =
                 [crate::scalar::number("starts[0]", &earliest)?, crate::scalar::number("starts[1]", &latest)?];
         }
+        let given = |context| prior.given(&self.0, &context_for(&self.0, context)?).map_err(raise);
+        let given = context.map(given).transpose()?;
+        let prior = given.as_ref().unwrap_or(prior);
         let inner = pdmp_core::inference::Recogniser::new(&self.0, prior, timing).map_err(raise)?;
         Ok(Recogniser { inner, kind: self.0.kind(), position: Vec::new() })
     }

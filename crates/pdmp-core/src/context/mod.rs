@@ -5,6 +5,7 @@
 //! each context has the same weight: errors common to the demonstrations of a context do not average out, however many
 //! there are.
 
+mod deviations;
 mod encoding;
 mod kernel;
 mod kriging;

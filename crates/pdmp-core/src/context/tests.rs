@@ -241,3 +241,41 @@ fn bands_of_few_contexts_have_their_nominal_coverage() {
     let coverage = n_covered as f64 / n_trials as f64;
     assert!((0.85..0.95).contains(&coverage), "{coverage}");
 }
+
+/// Deviations are those from the prediction by the other contexts: of a line, from one fitted to them, with a context that was
+/// repeated; of every kind, with the mean square that the map states.
+#[test]
+fn deviations_are_those_from_the_other_contexts() {
+    let h = [0.0, 0.1, 0.25, 0.25, 0.4, 0.7, 1.0];
+    let outputs = Array2::from_shape_fn((7, 2), |(m, p)| (3.0 * h[m] + p as f64).sin() + 0.05 * (7.0 * m as f64).cos());
+    let table = Array2::from_shape_fn((7, 1), |(m, _)| h[m]);
+    let deviations = linear(&h, &outputs).deviations(&table, outputs.view()).unwrap();
+    for m in 0..7 {
+        let others: Vec<usize> = (0..7).filter(|&k| h[k] != h[m]).collect();
+        let known: Vec<f64> = others.iter().map(|&k| h[k]).collect();
+        let prediction = linear(&known, &outputs.select(Axis(0), &others)).predict(&[h[m]]).unwrap().mean;
+        for p in 0..2 {
+            assert_relative_eq!(deviations[[m, p]], outputs[[m, p]] - prediction[p], epsilon = 1e-9);
+        }
+    }
+    for kind in ContextMapKind::ALL {
+        let map = ContextMap::fit(&contexts(&h), outputs.view(), MapSelection::Given(kind)).unwrap();
+        let deviations = map.deviations(&table, outputs.view()).unwrap();
+        let repeated = (&deviations.row(2) + &deviations.row(3)) / 2.0;
+        let squares: f64 = [0, 1, 4, 5, 6].iter().map(|&m| deviations.row(m).dot(&deviations.row(m))).sum();
+        assert_relative_eq!((squares + repeated.dot(&repeated)) / 6.0, map.errors()[0].1, max_relative = 1e-9);
+    }
+}
+
+/// The deviation of a movement with a label is that from the others of the label; of the only one, from all others.
+#[test]
+fn deviations_of_labels_are_those_from_the_others_of_the_label() {
+    let labels = ["a", "b", "a", "a", "c"].map(|label| vec![label.into()]);
+    let outputs = array![[1.0], [5.0], [2.0], [6.0], [8.0]];
+    let map = ContextMap::fit(&labels, outputs.view(), MapSelection::Auto).unwrap();
+    let numbers = array![[0.0], [1.0], [0.0], [0.0], [2.0]];
+    let deviations = map.deviations(&numbers, outputs.view()).unwrap();
+    // The mean of each label counts once: (3 + 8)/2 and (3 + 5)/2 without "b" and "c".
+    let expected = array![[1.0 - 4.0], [5.0 - 5.5], [2.0 - 3.5], [6.0 - 1.5], [8.0 - 4.0]];
+    assert!((&deviations - &expected).iter().all(|error| error.abs() < 1e-12), "{deviations}");
+}

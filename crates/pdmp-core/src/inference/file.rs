@@ -5,7 +5,7 @@ use std::path::Path;
 use ndarray::Array2;
 
 use super::calibration::{BandFactors, Calibration, SHARES};
-use super::prior::{Prior, Settings, frame_size};
+use super::prior::{Mixture, Prior, Settings, frame_size};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::file::section::Section;
@@ -13,6 +13,8 @@ use crate::model::file::{ensure, read_file, unreadable, write_atomically};
 
 /// Version of the format of a prior.
 const SCHEMA: u32 = 1;
+/// Prefix of the names of deviations.
+const DEVIATIONS: &str = "deviations.";
 
 impl Prior {
     /// Writes a model file with this prior, atomically, as [`Model::save`] does. [`Model::load`] reads the model from it.
@@ -63,18 +65,9 @@ impl Prior {
     }
 
     fn section(&self) -> Section {
-        let Settings { bandwidth, tempering, correlation_time } = self.settings();
-        let (parameters, n_demos) = (self.parameters(), self.n_demos());
-        Section::new(SCHEMA)
-            .with_array("parameters", parameters.shape(), parameters.iter().copied().collect())
-            .with_array("log_durations", &[n_demos], self.log_durations().to_vec())
-            .with_array("residual", &[self.residual().len()], self.residual().to_vec())
-            .with_array("settings", &[3], vec![bandwidth, tempering, correlation_time])
-            .with_array(
-                "calibration",
-                &[SHARES.len(), 4],
-                self.calibration().0.into_iter().flat_map(<[f64; 4]>::from).collect(),
-            )
+        let section = Section::new(SCHEMA).with_array("residual", &[self.residual().len()], self.residual().to_vec());
+        let section = self.mixture().write(section, "");
+        self.deviations().into_iter().fold(section, |section, deviations| deviations.write(section, DEVIATIONS))
     }
 
     /// Reads the prior from the bytes of a model file.
@@ -86,19 +79,48 @@ impl Prior {
         let mut section = section.ok_or_else(|| unreadable("it has no prior: save the model with one"))?;
         let found = section.version;
         ensure(found == SCHEMA, &format!("a prior of version {found}, while this library reads version {SCHEMA}"))?;
-        let n_demos = section.shape_of("log_durations")?.first().copied().unwrap_or_default();
-        let shape = (n_demos, model.n_styles() + frame_size(model.kind()) * model.n_dofs());
-        let parameters = section.take_array("parameters", &[shape.0, shape.1])?;
-        let parameters = Array2::from_shape_vec(shape, parameters).map_err(unreadable)?;
-        let log_durations = section.take_array("log_durations", &[n_demos])?;
+        let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
         let residual = section.take_array("residual", &[model.n_dofs()])?;
-        let settings = section.take_array("settings", &[3])?;
-        let settings = Settings { bandwidth: settings[0], tempering: settings[1], correlation_time: settings[2] };
-        let factors = section.take_array("calibration", &[SHARES.len(), 4])?;
+        let mixture = Mixture::take(&mut section, "", n_parameters)?;
+        let has_deviations = section.shape_of(&format!("{DEVIATIONS}parameters")).is_ok();
+        let deviations = has_deviations.then(|| Mixture::take(&mut section, DEVIATIONS, n_parameters)).transpose()?;
         section.close()?;
+        let prior = Self::new(model.kind(), mixture, residual).map_err(unreadable)?;
+        deviations.map_or(Ok(prior.clone()), |deviations| prior.with_deviations(deviations)).map_err(unreadable)
+    }
+}
+
+impl Mixture {
+    /// Adds the arrays of a mixture, with names that begin with a prefix.
+    fn write(&self, section: Section, prefix: &str) -> Section {
+        let Self { parameters, log_durations, settings, calibration } = self;
+        let &Settings { bandwidth, tempering, correlation_time } = settings;
+        let factors = calibration.0.into_iter().flat_map(<[f64; 4]>::from).collect();
+        let name = |name: &str| format!("{prefix}{name}");
+        section
+            .with_array(&name("parameters"), parameters.shape(), parameters.iter().copied().collect())
+            .with_array(&name("log_durations"), &[log_durations.len()], log_durations.clone())
+            .with_array(&name("settings"), &[3], vec![bandwidth, tempering, correlation_time])
+            .with_array(&name("calibration"), &[SHARES.len(), 4], factors)
+    }
+
+    /// Takes the arrays of a mixture out.
+    ///
+    /// # Errors
+    /// An array that is missing or of another shape.
+    fn take(section: &mut Section, prefix: &str, n_parameters: usize) -> Result<Self> {
+        let n_demos = section.shape_of(&format!("{prefix}log_durations"))?.first().copied().unwrap_or_default();
+        let mut take = |name: &str, shape: &[usize]| section.take_array(&format!("{prefix}{name}"), shape);
+        let settings = take("settings", &[3])?;
+        let factors = take("calibration", &[SHARES.len(), 4])?;
+        let parameters = take("parameters", &[n_demos, n_parameters])?;
         let factors = |share: usize| BandFactors::from([0, 1, 2, 3].map(|k| factors[4 * share + k]));
-        let calibration = Calibration(std::array::from_fn(factors));
-        Self::new(model.kind(), parameters, log_durations, residual, settings, calibration).map_err(unreadable)
+        Ok(Self {
+            parameters: Array2::from_shape_vec((n_demos, n_parameters), parameters).map_err(unreadable)?,
+            log_durations: take("log_durations", &[n_demos])?,
+            settings: Settings { bandwidth: settings[0], tempering: settings[1], correlation_time: settings[2] },
+            calibration: Calibration(std::array::from_fn(factors)),
+        })
     }
 }
 
@@ -126,12 +148,15 @@ mod tests {
     /// A prior of a newer version, or with other arrays, is refused; the model of the same file is read.
     #[test]
     fn sections_of_other_forms_are_refused() {
-        let prior = prior(&MODEL, 0.5);
+        let prior = prior(&MODEL, 0.5).with_deviations(prior(&MODEL, 0.3).mixture().clone()).unwrap();
         let mut newer = prior.section();
         newer.version = 2;
         assert_eq!(refusal(&newer), "a prior of version 2, while this library reads version 1");
         assert!(refusal(&prior.section().with_array("other", &[1], vec![1.0])).contains("do not belong to a prior"));
-        for name in ["parameters", "log_durations", "residual", "settings", "calibration"] {
+        let names = ["parameters", "log_durations", "settings", "calibration"];
+        let of_deviations = names[1..].iter().map(|name| format!("{DEVIATIONS}{name}"));
+        for name in names.into_iter().chain(["residual"]).map(str::to_string).chain(of_deviations) {
+            let name = name.as_str();
             let mut less = prior.section();
             let shape = less.shape_of(name).unwrap();
             let mut data = less.take_array(name, &shape).unwrap();

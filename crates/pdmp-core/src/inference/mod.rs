@@ -27,7 +27,7 @@ pub use calibration::{BandFactors, Calibration};
 pub use continuation::Continuation;
 pub use estimate::Estimate;
 pub(crate) use movement_table::responses;
-pub use prior::{Prior, Settings};
+pub use prior::{Mixture, Prior, Settings};
 pub use recogniser::{Recogniser, Timing};
 pub use via_points::{At, Passage, PassageOptions, ViaPoint, through};
 

@@ -3,6 +3,7 @@
 use ndarray::{Array2, ArrayView2, Axis};
 
 use super::calibration::Calibration;
+use crate::demonstration::ContextValue;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::Model;
@@ -26,6 +27,19 @@ pub struct Settings {
     pub correlation_time: f64,
 }
 
+/// Mixture of Gaussian kernels on M demonstrations, with the settings and factors of a recogniser.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mixture {
+    /// Style (J,), goal (D,) and start (D,) of each demonstration, or style and anchor (D,) of a rhythmic movement (M, K).
+    pub parameters: Array2<f64>,
+    /// Logarithms (M,) of the durations in seconds.
+    pub log_durations: Vec<f64>,
+    /// Settings.
+    pub settings: Settings,
+    /// Factors of the bands.
+    pub calibration: Calibration,
+}
+
 /// Prior distribution of style, goal, start or anchor, and duration, from the demonstrations of a model.
 ///
 /// A mixture of Gaussian kernels, one on each of the M demonstrations, of covariance c²Σ about centres drawn towards the
@@ -35,6 +49,8 @@ pub struct Settings {
 /// p(θ, log T) = 1/M Σₘ N(μ + √(1−c²)(θₘ − μ), c²Σ).
 /// ```
 ///
+/// In a given context ([`Prior::given`]) the demonstrations are replaced by the prediction for it plus their deviations.
+///
 /// A movement deviates from y = Φ(u)θ by a residual of standard deviation σ_d: an Ornstein-Uhlenbeck process, which stands
 /// for the shapes that the styles lack, plus white noise. The exponent β of the likelihood limits the confidence of a
 /// model that is not exact (P. Grünwald, T. van Ommen, Bayesian Analysis 12, 2017, doi:10.1214/17-BA1085).
@@ -42,11 +58,40 @@ pub struct Settings {
 pub struct Prior {
     kind: Kind,
     n_styles: usize,
-    parameters: Array2<f64>,
-    log_durations: Vec<f64>,
     residual: Vec<f64>,
-    settings: Settings,
-    calibration: Calibration,
+    mixture: Mixture,
+    /// Deviations of the demonstrations from the predictions for their contexts, if there are any.
+    deviations: Option<Mixture>,
+}
+
+impl Settings {
+    fn check(&self) -> Result<()> {
+        let share = |value: f64| (1e-6..=1.0).contains(&value);
+        let &Self { bandwidth, tempering, correlation_time } = self;
+        check_range("bandwidth", bandwidth, share(bandwidth), "must lie between 1e-6 and 1")?;
+        check_range("tempering", tempering, share(tempering), "must lie between 1e-6 and 1")?;
+        let valid = (1e-9..=1e9).contains(&correlation_time);
+        check_range("correlation_time", correlation_time, valid, "seconds must lie between 1e-9 and 1e9")
+    }
+}
+
+impl Mixture {
+    /// Returns the mixture if it is valid, with its parameters in one order in memory, on which rounding depends.
+    fn checked(self) -> Result<Self> {
+        check_matrix("parameters", self.parameters.view())?;
+        if self.parameters.nrows() < MIN_DEMOS {
+            let problem = "of fewer than three demonstrations: a prior needs at least three";
+            return Err(Error::Argument { name: "parameters", problem });
+        }
+        check_length("log_durations", self.log_durations.len(), self.parameters.nrows(), "demonstration")?;
+        check_finite("log_durations", &self.log_durations)?;
+        let allowed = "must be the logarithms of durations between 1e-9 and 1e9 s";
+        let valid = |log: f64| log.abs() <= 20.8;
+        self.log_durations.iter().try_for_each(|&log| check_range("log_durations", log, valid(log), allowed))?;
+        self.settings.check()?;
+        self.calibration.check()?;
+        Ok(Self { parameters: self.parameters.as_standard_layout().into_owned(), ..self })
+    }
 }
 
 /// Moments of the demonstrations.
@@ -64,20 +109,20 @@ pub(crate) struct Moments {
 }
 
 impl Prior {
-    /// Creates a prior from the parameters (M, K) of demonstrations, the logarithms (M,) of their durations in seconds,
-    /// and the standard deviations (D,) of the residual.
-    ///
-    /// The parameters are style (J,), goal (D,) and start (D,), or style and anchor (D,) of a rhythmic movement.
+    /// Creates a prior from the demonstrations, and the standard deviations (D,) of the residual.
     ///
     /// ```
     /// use ndarray::array;
     /// use pdmp_core::Kind;
-    /// use pdmp_core::inference::{Calibration, Prior, Settings};
+    /// use pdmp_core::inference::{Calibration, Mixture, Prior, Settings};
     ///
-    /// let settings = Settings { bandwidth: 0.5, tempering: 1.0, correlation_time: 0.1 };
-    /// let parameters = array![[0.1, 1.0, 0.0], [0.2, 1.1, 0.0], [0.4, 1.3, 0.1]];
-    /// let durations = vec![0.0, 0.1, 0.2];
-    /// let prior = Prior::new(Kind::Discrete, parameters, durations, vec![0.01], settings, Calibration::NONE)?;
+    /// let mixture = Mixture {
+    ///     parameters: array![[0.1, 1.0, 0.0], [0.2, 1.1, 0.0], [0.4, 1.3, 0.1]],
+    ///     log_durations: vec![0.0, 0.1, 0.2],
+    ///     settings: Settings { bandwidth: 0.5, tempering: 1.0, correlation_time: 0.1 },
+    ///     calibration: Calibration::NONE,
+    /// };
+    /// let prior = Prior::new(Kind::Discrete, mixture, vec![0.01])?;
     /// assert_eq!((prior.n_demos(), prior.n_styles()), (3, 1));
     /// # Ok::<(), pdmp_core::Error>(())
     /// ```
@@ -85,43 +130,75 @@ impl Prior {
     /// # Errors
     /// Fewer than three demonstrations, lengths that do not match, numbers that are not finite, durations outside of 1e-9 to
     /// 1e9 s, or settings or factors out of range.
-    pub fn new(
-        kind: Kind,
-        parameters: Array2<f64>,
-        log_durations: Vec<f64>,
-        residual: Vec<f64>,
-        settings: Settings,
-        calibration: Calibration,
-    ) -> Result<Self> {
-        check_matrix("parameters", parameters.view())?;
-        check_length("log_durations", log_durations.len(), parameters.nrows(), "demonstration")?;
-        check_finite("log_durations", &log_durations)?;
-        let allowed = "must be the logarithms of durations between 1e-9 and 1e9 s";
-        let valid = |log: f64| log.abs() <= 20.8;
-        log_durations.iter().try_for_each(|&log| check_range("log_durations", log, valid(log), allowed))?;
+    pub fn new(kind: Kind, mixture: Mixture, residual: Vec<f64>) -> Result<Self> {
+        let mixture = mixture.checked()?;
         check_finite("residual", &residual)?;
-        if parameters.nrows() < MIN_DEMOS {
-            let problem = "of fewer than three demonstrations: a prior needs at least three";
-            return Err(Error::Argument { name: "parameters", problem });
-        }
-        let n_positions = frame_size(kind) * residual.len();
-        if residual.is_empty() || parameters.ncols() <= n_positions {
-            let (expected, found) = (n_positions + 1, parameters.ncols());
-            return Err(Error::Length {
-                name: "parameters",
-                expected,
-                found,
-                per: "style, and goal and start of each DoF",
-            });
+        let (n_positions, found) = (frame_size(kind) * residual.len(), mixture.parameters.ncols());
+        if residual.is_empty() || found <= n_positions {
+            let (name, per) = ("parameters", "style, and goal and start of each DoF");
+            return Err(Error::Length { name, expected: n_positions + 1, found, per });
         }
         let allowed = "must lie between 1e-100 and 1e100";
         let valid = |sd: f64| (1e-100..=1e100).contains(&sd);
         residual.iter().try_for_each(|&sd| check_range("residual", sd, valid(sd), allowed))?;
-        calibration.check()?;
-        let n_styles = parameters.ncols() - n_positions;
-        // Rounding depends on the order in memory.
-        let parameters = parameters.as_standard_layout().into_owned();
-        Self { kind, n_styles, parameters, log_durations, residual, settings, calibration }.with_settings(settings)
+        Ok(Self { kind, n_styles: found - n_positions, residual, mixture, deviations: None })
+    }
+
+    /// Returns the prior with the deviations of the demonstrations from the predictions for their contexts, with settings
+    /// and factors of recognition in a given context.
+    ///
+    /// # Errors
+    /// A shape other than that of the demonstrations, and as for [`Prior::new`].
+    pub fn with_deviations(self, deviations: Mixture) -> Result<Self> {
+        let deviations = deviations.checked()?;
+        let (rows, columns) = deviations.parameters.dim();
+        check_length("deviations", rows, self.n_demos(), "demonstration")?;
+        check_length("deviations", columns, self.mixture.parameters.ncols(), "parameter of a demonstration")?;
+        Ok(Self { deviations: Some(deviations), ..self })
+    }
+
+    /// Returns the prior of movements in a context (Q,) of a model: kernels on the sums of the prediction θ(h) for the context
+    /// and the deviation of each demonstration from the prediction for its context by the other demonstrations,
+    ///
+    /// ```text
+    /// p(θ, log T | h) = 1/M Σₘ N(μ + √(1−c²)(θ'ₘ − μ), c²Σ),  θ'ₘ = θ(h) + θₘ − θ₋ₘ(hₘ),
+    /// ```
+    ///
+    /// with mean μ and covariance Σ of the sums.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # use pdmp_core::learning::learn_prior;
+    /// # use pdmp_core::numerics::Threads;
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # // Each obstacle is passed twice.
+    /// # let demos = [demos.clone(), demos].concat();
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let prior = learn_prior(&model, &demos, None, Threads::ONE)?;
+    /// // The height of the obstacle is known.
+    /// let given = prior.given(&model, &[0.15])?;
+    /// assert_eq!(given.n_demos(), prior.n_demos());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// A prior of another model or without deviations, or a context that [`Model::predict`] refuses.
+    pub fn given<V: Clone + Into<ContextValue>>(&self, model: &Model, context: &[V]) -> Result<Self> {
+        self.check_model(model)?;
+        let (prediction, durations) = (model.map_of_context()?.predict(context)?.mean, model.predicted_durations());
+        let problem =
+            "does not apply: the prior has no contexts; learn it from a model with contexts, with two demonstrations of each label";
+        let deviations = self.deviations.as_ref().ok_or(Error::Argument { name: "context", problem })?;
+        let n_parameters = self.mixture.parameters.ncols();
+        let log_duration = prediction[n_parameters].clamp(durations.start().ln(), durations.end().ln());
+        let mixture = Mixture {
+            parameters: &deviations.parameters + &ndarray::aview1(&prediction[..n_parameters]),
+            log_durations: deviations.log_durations.iter().map(|deviation| log_duration + deviation).collect(),
+            ..*deviations
+        };
+        Self::new(self.kind, mixture, self.residual.clone())
     }
 
     /// Returns the prior with other settings.
@@ -129,18 +206,8 @@ impl Prior {
     /// # Errors
     /// A bandwidth or exponent outside 1e-6 to 1, or a correlation time that is not positive.
     pub(crate) fn with_settings(self, settings: Settings) -> Result<Self> {
-        let share = |value: f64| (1e-6..=1.0).contains(&value);
-        let Settings { bandwidth, tempering, correlation_time } = settings;
-        check_range("bandwidth", bandwidth, share(bandwidth), "must lie between 1e-6 and 1")?;
-        check_range("tempering", tempering, share(tempering), "must lie between 1e-6 and 1")?;
-        let valid = (1e-9..=1e9).contains(&correlation_time);
-        check_range("correlation_time", correlation_time, valid, "seconds must lie between 1e-9 and 1e9")?;
-        Ok(Self { settings, ..self })
-    }
-
-    /// Returns the prior with another calibration.
-    pub(crate) fn with_calibration(self, calibration: Calibration) -> Self {
-        Self { calibration, ..self }
+        settings.check()?;
+        Ok(Self { mixture: Mixture { settings, ..self.mixture }, ..self })
     }
 
     /// Checks that the prior may be one of a model.
@@ -150,7 +217,7 @@ impl Prior {
     pub(crate) fn check_model(&self, model: &Model) -> Result<()> {
         let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
         let same = self.kind == model.kind() && self.residual.len() == model.n_dofs();
-        if !same || self.parameters.ncols() != n_parameters {
+        if !same || self.mixture.parameters.ncols() != n_parameters {
             let problem = "is of another model: its kind, styles or degrees of freedom differ";
             return Err(Error::Argument { name: "prior", problem });
         }
@@ -164,7 +231,7 @@ impl Prior {
 
     /// Returns the number of demonstrations M.
     pub fn n_demos(&self) -> usize {
-        self.parameters.nrows()
+        self.mixture.parameters.nrows()
     }
 
     /// Returns the style dimension J.
@@ -174,12 +241,12 @@ impl Prior {
 
     /// Returns the parameters (M, K) of the demonstrations.
     pub fn parameters(&self) -> ArrayView2<'_, f64> {
-        self.parameters.view()
+        self.mixture.parameters.view()
     }
 
     /// Returns the logarithms (M,) of the durations in seconds.
     pub fn log_durations(&self) -> &[f64] {
-        &self.log_durations
+        &self.mixture.log_durations
     }
 
     /// Returns the standard deviations σ (D,) of the residual.
@@ -189,22 +256,34 @@ impl Prior {
 
     /// Returns the settings.
     pub fn settings(&self) -> Settings {
-        self.settings
+        self.mixture.settings
     }
 
     /// Returns the factors of the bands.
     pub fn calibration(&self) -> &Calibration {
-        &self.calibration
+        &self.mixture.calibration
+    }
+
+    /// Returns the demonstrations, with settings and factors.
+    pub fn mixture(&self) -> &Mixture {
+        &self.mixture
+    }
+
+    /// Returns their deviations from the predictions for their contexts, with settings and factors of recognition in a given
+    /// context; `None` without contexts.
+    pub fn deviations(&self) -> Option<&Mixture> {
+        self.deviations.as_ref()
     }
 
     /// Computes the moments of the demonstrations. The covariance is shrunk towards its diagonal (O. Ledoit, M. Wolf,
     /// J. Multivar. Anal. 88, 2004), since it is singular with fewer demonstrations than parameters.
     pub(crate) fn moments(&self) -> Moments {
         let n = self.n_demos() as f64;
-        let mean = self.parameters.sum_axis(Axis(0)) / n;
-        let log_mean = self.log_durations.iter().sum::<f64>() / n;
-        let deviations = &self.parameters - &mean;
-        let logs: ndarray::Array1<f64> = self.log_durations.iter().map(|log| log - log_mean).collect();
+        let Mixture { parameters, log_durations, .. } = &self.mixture;
+        let mean = parameters.sum_axis(Axis(0)) / n;
+        let log_mean = log_durations.iter().sum::<f64>() / n;
+        let deviations = parameters - &mean;
+        let logs: ndarray::Array1<f64> = log_durations.iter().map(|log| log - log_mean).collect();
         let log_variance = logs.dot(&logs) / n + MIN_LOG_DEVIATION * MIN_LOG_DEVIATION;
         let slope = deviations.t().dot(&logs) * ((1.0 - SHRINKAGE) / n / log_variance);
         let mut covariance = deviations.t().dot(&deviations) / n;

@@ -7,7 +7,7 @@ use super::evidence::{Belief, Kernels, Weigh};
 use super::movement_table::MovementTable;
 use super::noise_filter::NoiseFilter;
 use super::triangle::square;
-use super::{Calibration, Prior, Recogniser, Settings, Timing};
+use super::{Calibration, Mixture, Prior, Recogniser, Settings, Timing};
 use crate::numerics::simd::{F64x4, Kernel};
 use crate::random::Random;
 use crate::{Demonstration, FitOptions, Kind, Model, Sampling, fit};
@@ -34,9 +34,10 @@ pub(super) fn prior(model: &Model, bandwidth: f64) -> Prior {
     let demonstrated = model.demonstrated();
     let parts = [demonstrated.styles.view(), demonstrated.goals.view(), demonstrated.starts.view()];
     let parameters = ndarray::concatenate(ndarray::Axis(1), &parts).unwrap();
-    let logs = demonstrated.durations.iter().map(|duration| duration.ln()).collect();
+    let log_durations = demonstrated.durations.iter().map(|duration| duration.ln()).collect();
     let settings = Settings { bandwidth, tempering: 1.0, correlation_time: 0.1 };
-    Prior::new(Kind::Discrete, parameters, logs, vec![0.004, 0.006], settings, Calibration::NONE).unwrap()
+    let mixture = Mixture { parameters, log_durations, settings, calibration: Calibration::NONE };
+    Prior::new(Kind::Discrete, mixture, vec![0.004, 0.006]).unwrap()
 }
 
 /// Normal random number, the sum of twelve uniform ones.

@@ -13,6 +13,7 @@ mod tangent;
 pub(crate) mod template;
 
 use std::ops::Deref;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use ndarray::{Array2, Axis};
@@ -255,20 +256,29 @@ impl Model {
     /// # Errors
     /// A model without a context map, a context of another length, an unknown label, or a number that is not finite.
     pub fn predict<V: Clone + Into<ContextValue>>(&self, context: &[V]) -> Result<Prediction> {
-        let map = self.map.as_ref().ok_or(Error::Argument { name: "context", problem: "does not apply: the model has no context map; fit it with contexts, or with demonstrations that have one" })?;
+        let map = self.map_of_context()?;
+        let (outputs, degrees_of_freedom) = (map.predict(context)?, map.degrees_of_freedom());
+        let (n_styles, n_dofs, durations) = (self.n_styles(), self.n_dofs(), self.predicted_durations());
+        let prediction = Prediction::of(outputs, degrees_of_freedom, self.kind(), n_styles, n_dofs, durations)?;
+        Ok(Prediction { conditions: self.outside(prediction.conditions), ..prediction })
+    }
+
+    /// Returns the context map.
+    ///
+    /// # Errors
+    /// The model has none.
+    pub(crate) fn map_of_context(&self) -> Result<&ContextMap> {
+        let problem =
+            "does not apply: the model has no context map; fit it with contexts, or with demonstrations that have one";
+        self.map.as_ref().ok_or(Error::Argument { name: "context", problem })
+    }
+
+    /// Returns the range of predicted durations, in seconds.
+    pub(crate) fn predicted_durations(&self) -> RangeInclusive<f64> {
         let demonstrated = self.demonstrated.durations.iter();
         let [shortest, longest] =
             [f64::min, f64::max].map(|extreme| demonstrated.clone().copied().reduce(extreme).unwrap_or(1.0));
-        let durations = shortest / MAX_DURATION_RATIO..=longest * MAX_DURATION_RATIO;
-        let prediction = Prediction::of(
-            map.predict(context)?,
-            map.degrees_of_freedom(),
-            self.kind(),
-            self.n_styles(),
-            self.n_dofs(),
-            durations,
-        )?;
-        Ok(Prediction { conditions: self.outside(prediction.conditions), ..prediction })
+        shortest / MAX_DURATION_RATIO..=longest * MAX_DURATION_RATIO
     }
 }
 

@@ -2,37 +2,27 @@
 
 mod folds;
 mod recording;
+mod selection;
 mod simulation;
 
-use ndarray::{Array2, Axis, concatenate};
+use ndarray::{Array2, ArrayView2, Axis};
 
-use crate::demonstration::Demonstration;
+use crate::context::ContextMap;
+use crate::demonstration::{ContextValue, Demonstration};
 use crate::error::{Error, Result};
 use crate::inference::prior::MIN_DEMOS;
 use crate::inference::recogniser::check_linear;
-use crate::inference::{BandFactors, Calibration, Prior, SHARES, Settings};
-use crate::kind::Kind;
+use crate::inference::{Calibration, Mixture, Prior, Settings};
 use crate::model::Model;
 use crate::numerics::threads::Threads;
 use crate::validate::check_length;
 
-use folds::{Fold, folds};
+use folds::folds;
 use recording::Recording;
-use simulation::{Outcome, SimulatedErrors, errors, outcomes, refit};
+use simulation::{Refit, Simulation};
 
-/// Bandwidths of the kernels, in order of preference.
-const BANDWIDTHS: [f64; 3] = [0.6, 1.0, 0.3];
-/// Exponents of the likelihood.
-const TEMPERINGS: [f64; 3] = [0.1, 1.0, 0.01];
-/// Correlation times of the residual, in mean durations.
-const CORRELATION_TIMES: [f64; 2] = [0.15, 0.5];
 /// Residual of every DoF in addition to that of the demonstrations, relative to the deviation of their positions.
 const MIN_RESIDUAL: f64 = 0.02;
-/// Quantile of the Gaussian distribution at 0.95, the half-width of a band of 90 %.
-const BAND: f64 = 1.644_853_626_951_472_2;
-/// Coverage of the bands.
-const COVERAGE: f64 = 0.9;
-
 /// Learns the prior of style, goal, start or anchor, and duration from the M demonstrations of a model, in their order.
 ///
 /// Bandwidth, exponent of the likelihood and correlation time of the residual are those with the smallest error of the
@@ -75,67 +65,67 @@ pub fn learn_prior(
     let durations = &model.demonstrated().durations;
     let of = |(m, demo): (usize, &Demonstration)| Recording::new(demo, model, durations[m]).map_err(|e| e.in_demo(m));
     let recordings: Vec<Recording> = demos.iter().enumerate().map(of).collect::<Result<_>>()?;
-    let folds = folds(demos.len(), groups)?;
-    let each = Each { recordings: &recordings, folds: &folds, threads };
-    let models = each.result(|_, fold| refit(model, demos, fold))?;
-    let errors = each.result(|k, fold| errors(&each, &models[k], fold))?;
-    let (correlation, settings) = best(&errors.concat());
-    let outcomes = each.result(|k, fold| outcomes(&each, &models[k], fold, correlation, settings))?.concat();
-    let all: Vec<&Recording> = recordings.iter().collect();
-    let settings = of_duration(settings, correlation, &model.demonstrated().durations);
-    Ok(prior_of(model, &all, settings)?.with_calibration(calibration(&outcomes)))
+    let contexts = contexts_of(model)?;
+    let shown = Shown { demos, recordings: &recordings, contexts: contexts.as_deref() };
+    let refits = each(threads, &folds(demos.len(), groups)?, |fold| Refit::new(model, &shown, fold))?;
+    let prior = prior_of(model, &recordings.iter().collect::<Vec<_>>())?;
+    let simulation = Simulation { recordings: &recordings, refits: &refits, contexts: None, threads };
+    let (settings, calibration) = simulation.learn(durations)?;
+    let mixture = Mixture { settings, calibration, ..prior.mixture().clone() };
+    let learnt = Prior::new(model.kind(), mixture, prior.residual().to_vec())?;
+    let simulation = Simulation { contexts: contexts.as_deref(), ..simulation };
+    match prior.deviations() {
+        Some(deviations) if simulation.n_held_out()? >= MIN_DEMOS => {
+            let (settings, calibration) = simulation.learn(durations)?;
+            learnt.with_deviations(Mixture { settings, calibration, ..deviations.clone() })
+        }
+        _ => Ok(learnt),
+    }
 }
 
-/// Demonstrations and their folds.
-struct Each<'a> {
+/// Demonstrations, with what is known of each.
+struct Shown<'a> {
+    demos: &'a [Demonstration],
     recordings: &'a [Recording],
-    folds: &'a [Fold],
-    threads: Threads,
+    /// Contexts (M, Q), if there are any.
+    contexts: Option<&'a [Vec<ContextValue>]>,
 }
 
-impl Each<'_> {
-    /// Computes a result for each fold, by several threads.
-    fn result<T: Send>(&self, work: impl Fn(usize, &Fold) -> Result<T> + Sync) -> Result<Vec<T>> {
-        let mut results: Vec<Option<T>> = self.folds.iter().map(|_| None).collect();
-        let tasks = results.iter_mut().zip(self.folds).enumerate().collect();
-        self.threads.try_for_each(tasks, |(k, (result, fold)): (usize, (&mut Option<T>, &Fold))| {
-            *result = Some(work(k, fold)?);
-            Ok(())
-        })?;
-        Ok(results.into_iter().flatten().collect())
-    }
-
-    /// Returns the recordings that a fold learns from.
-    fn training(&self, fold: &Fold) -> Vec<&Recording> {
-        fold.training.iter().map(|&m| &self.recordings[m]).collect()
-    }
-}
-
-/// Returns settings with a correlation time relative to the geometric mean of durations in seconds.
-fn of_duration(settings: Settings, correlation: f64, durations: &[f64]) -> Settings {
-    let mean = (durations.iter().map(|duration| duration.ln()).sum::<f64>() / durations.len() as f64).exp();
-    Settings { correlation_time: correlation * mean, ..settings }
-}
-
-/// Returns the candidates for one correlation time.
-fn candidates() -> impl Iterator<Item = Settings> {
-    let of = |tempering| BANDWIDTHS.into_iter().map(move |bandwidth| (bandwidth, tempering));
-    let settings = |(bandwidth, tempering)| Settings { bandwidth, tempering, correlation_time: 1.0 };
-    TEMPERINGS.into_iter().flat_map(of).map(settings)
-}
-
-/// Returns the prior of the demonstrations of a model with given settings, and bands that are not scaled.
-fn prior_of(model: &Model, recordings: &[&Recording], settings: Settings) -> Result<Prior> {
-    let demonstrated = model.demonstrated();
-    let parameters = match model.kind() {
-        Kind::Discrete => vec![demonstrated.styles.view(), demonstrated.goals.view(), demonstrated.starts.view()],
-        Kind::Rhythmic => vec![demonstrated.styles.view(), demonstrated.anchors.view()],
+/// Returns the contexts of the demonstrations of a model; `None` without a context map.
+fn contexts_of(model: &Model) -> Result<Option<Vec<Vec<ContextValue>>>> {
+    let demonstrated = model.map().zip(model.demonstrated().contexts.as_ref());
+    let of = |(map, contexts): (&ContextMap, &Array2<f64>)| {
+        contexts.rows().into_iter().map(|row| map.context(&row.to_vec())).collect::<Result<Vec<_>>>()
     };
-    let fit = |_| Error::Argument { name: "model", problem: "has demonstrations of different lengths" };
-    let parameters = concatenate(Axis(1), &parameters).map_err(fit)?;
-    let residual = residual(model, recordings, &parameters)?;
-    let logs = demonstrated.durations.iter().map(|duration| duration.ln()).collect();
-    Prior::new(model.kind(), parameters, logs, residual, settings, Calibration::NONE)
+    demonstrated.map(of).transpose()
+}
+
+/// Computes a result for each item, by several threads.
+fn each<A: Sync, T: Send>(threads: Threads, items: &[A], work: impl Fn(&A) -> Result<T> + Sync) -> Result<Vec<T>> {
+    let mut results: Vec<Option<T>> = items.iter().map(|_| None).collect();
+    let tasks = results.iter_mut().zip(items).collect();
+    threads.try_for_each(tasks, |(result, item): (&mut Option<T>, &A)| {
+        *result = Some(work(item)?);
+        Ok(())
+    })?;
+    Ok(results.into_iter().flatten().collect())
+}
+
+/// Returns the prior of the demonstrations of a model, with settings and factors to be learnt.
+fn prior_of(model: &Model, recordings: &[&Recording]) -> Result<Prior> {
+    let demonstrated = model.demonstrated();
+    let outputs = demonstrated.outputs(model.kind());
+    let mixture = |outputs: ArrayView2<f64>| {
+        let (parameters, logs) = outputs.split_at(Axis(1), outputs.ncols() - 1);
+        let settings = Settings { bandwidth: 1.0, tempering: 1.0, correlation_time: 1.0 };
+        let (parameters, log_durations) = (parameters.to_owned(), logs.iter().copied().collect());
+        Mixture { parameters, log_durations, settings, calibration: Calibration::NONE }
+    };
+    let own = mixture(outputs.view());
+    let residual = residual(model, recordings, &own.parameters)?;
+    let prior = Prior::new(model.kind(), own, residual)?;
+    let Some((map, contexts)) = model.map().zip(demonstrated.contexts.as_ref()) else { return Ok(prior) };
+    prior.with_deviations(mixture(map.deviations(contexts, outputs.view())?.view()))
 }
 
 /// Returns the root mean square deviation (D,) of the recordings from their reproductions, at least [`MIN_RESIDUAL`].
@@ -164,44 +154,4 @@ fn residual(model: &Model, recordings: &[&Recording], parameters: &Array2<f64>) 
         (squares[d] / n + MIN_RESIDUAL * MIN_RESIDUAL * variance).sqrt().max(1e-6 * scale).max(f64::MIN_POSITIVE.sqrt())
     };
     Ok((0..n_dofs).map(of).collect())
-}
-
-/// Returns the correlation time and the candidate with the smallest error of the rest, by the geometric mean over the
-/// shares seen.
-fn best(errors: &[SimulatedErrors]) -> (f64, Settings) {
-    let mut best =
-        (f64::INFINITY, CORRELATION_TIMES[0], Settings { bandwidth: 1.0, tempering: 1.0, correlation_time: 1.0 });
-    for (c, correlation) in CORRELATION_TIMES.into_iter().enumerate() {
-        for (k, settings) in candidates().enumerate() {
-            let of = |share: usize| errors.iter().map(|errors| errors[c][share][k]).sum::<f64>().max(1e-300);
-            let score = (0..SHARES.len()).map(|share| of(share).ln()).sum::<f64>();
-            if score < best.0 {
-                best = (score, correlation, settings);
-            }
-        }
-    }
-    (best.1, best.2)
-}
-
-/// Returns the factors of the bands.
-fn calibration(outcomes: &[Outcome]) -> Calibration {
-    Calibration([0, 1, 2, 3].map(|share| {
-        let own = outcomes.iter().filter(|outcome| outcome.share == share);
-        let of = |errors: &dyn Fn(&Outcome) -> Vec<f64>| quantile(own.clone().flat_map(errors).collect());
-        BandFactors {
-            position: of(&|outcome| outcome.positions.clone()) / BAND,
-            goal: of(&|outcome| outcome.goals.clone()) / BAND,
-            duration: of(&|outcome| vec![outcome.duration]) / BAND,
-            misfit: of(&|outcome| vec![outcome.misfit]),
-        }
-    }))
-}
-
-/// Returns the value that the share [`COVERAGE`] of n values and a new one do not exceed: the ⌈0.9 (n + 1)⌉-th.
-fn quantile(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let rank = (COVERAGE * (values.len() + 1) as f64).ceil() as usize;
-    let last = values.len().saturating_sub(1);
-    let value = values.get(rank.saturating_sub(1).min(last)).copied().filter(|value| !value.is_nan());
-    value.unwrap_or(BAND).clamp(1e-6, 1e6)
 }

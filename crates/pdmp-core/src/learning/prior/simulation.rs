@@ -2,10 +2,12 @@
 
 use super::folds::Fold;
 use super::recording::Recording;
-use super::{CORRELATION_TIMES, Each, candidates, of_duration, prior_of};
-use crate::demonstration::{Demonstration, Sampling};
-use crate::error::Result;
-use crate::inference::{Prior, Recogniser, SHARES, Settings, Timing};
+use super::selection::{CORRELATION_TIMES, best, calibration, candidates, of_duration};
+use super::{Shown, each, prior_of};
+use crate::context::MapSelection;
+use crate::demonstration::{ContextValue, Demonstration, Sampling};
+use crate::error::{Error, Result};
+use crate::inference::{Calibration, Prior, Recogniser, SHARES, Settings, Timing};
 use crate::learning::factorization::Truncation;
 use crate::learning::fit::fit;
 use crate::learning::options::{CanonicalOptions, FitOptions};
@@ -35,63 +37,130 @@ pub(super) struct Outcome {
     pub(super) misfit: f64,
 }
 
-/// Recognises held-out recordings with every candidate.
-pub(super) fn errors(each: &Each, model: &Model, fold: &Fold) -> Result<Vec<SimulatedErrors>> {
-    let training = each.training(fold);
-    let mut errors = vec![SimulatedErrors::new(); fold.held_out.len()];
-    for correlation in CORRELATION_TIMES {
-        let of =
-            |settings| prior_of(model, &training, of_duration(settings, correlation, &model.demonstrated().durations));
-        let priors = candidates().map(of).collect::<Result<Vec<_>>>()?;
-        let mut recogniser = Recogniser::with_durations(model, &priors[0], Timing::default(), N_DURATIONS)?;
-        for (errors, &m) in errors.iter_mut().zip(&fold.held_out) {
-            let mut of_shares = Vec::with_capacity(SHARES.len());
-            watch(&mut recogniser, &each.recordings[m], |recogniser, _, rest| {
-                let step = rest.len().div_ceil(MAX_POSITIONS).max(1);
-                let rest: Vec<_> = rest.iter().step_by(step).collect();
-                let time: Vec<f64> = rest.iter().map(|(time, _)| *time).collect();
-                let error = |prior: &Prior| {
-                    recogniser.set_prior(prior.clone());
-                    let predicted = recogniser.mean_continuation(&time)?;
-                    let square = predicted.indexed_iter().map(|((k, d), mean)| (rest[k].1[d] - mean).powi(2));
-                    Ok((square.sum::<f64>() / predicted.len().max(1) as f64).sqrt())
-                };
-                of_shares.push(priors.iter().map(error).collect::<Result<Vec<f64>>>()?);
-                Ok(())
-            })?;
-            errors.push(of_shares);
-        }
-    }
-    Ok(errors)
+/// Model of the demonstrations outside of a fold.
+pub(super) struct Refit {
+    model: Model,
+    prior: Prior,
+    held_out: Vec<usize>,
 }
 
-/// Recognises held-out recordings with the chosen settings.
-pub(super) fn outcomes(
-    each: &Each,
-    model: &Model,
-    fold: &Fold,
-    correlation: f64,
-    settings: Settings,
-) -> Result<Vec<Outcome>> {
-    let settings = of_duration(settings, correlation, &model.demonstrated().durations);
-    let mut recogniser = Recogniser::new(model, &prior_of(model, &each.training(fold), settings)?, Timing::default())?;
-    let mut outcomes = Vec::new();
-    for &m in &fold.held_out {
-        let recording = &each.recordings[m];
-        watch(&mut recogniser, recording, |recogniser, share, rest| {
-            let time: Vec<f64> = rest.iter().map(|(time, _)| *time).collect();
-            let predicted = recogniser.continuation(&time)?;
-            let errors = predicted.position.indexed_iter().zip(&predicted.deviation);
-            let positions = errors.map(|(((k, d), mean), deviation)| (rest[k].1[d] - mean).abs() / deviation).collect();
-            let estimate = recogniser.estimate()?;
-            let errors = estimate.goal().iter().zip(&recording.goal).zip(estimate.goal_deviation());
-            let goals = errors.map(|((mean, goal), deviation)| (mean - goal).abs() / deviation).collect();
-            let duration = (estimate.duration / recording.duration).ln().abs() / estimate.duration_deviation;
-            outcomes.push(Outcome { share, positions, goals, duration, misfit: estimate.surprise });
-            Ok(())
-        })?;
+impl Refit {
+    /// Fits the demonstrations outside of a fold.
+    pub(super) fn new(model: &Model, shown: &Shown, fold: &Fold) -> Result<Self> {
+        let model = refit(model, shown, fold)?;
+        let training: Vec<&Recording> = fold.training.iter().map(|&m| &shown.recordings[m]).collect();
+        Ok(Self { prior: prior_of(&model, &training)?, model, held_out: fold.held_out.clone() })
     }
-    Ok(outcomes)
+
+    /// Returns settings with a correlation time relative to the geometric mean of the durations.
+    fn settings(&self, settings: Settings, correlation: f64) -> Settings {
+        of_duration(settings, correlation, &self.model.demonstrated().durations)
+    }
+}
+
+/// Recognition of held-out recordings by models of the others.
+#[derive(Clone, Copy)]
+pub(super) struct Simulation<'a> {
+    pub(super) recordings: &'a [Recording],
+    pub(super) refits: &'a [Refit],
+    /// Contexts (M, Q) in which recordings are recognised; `None` for recognition without contexts.
+    pub(super) contexts: Option<&'a [Vec<ContextValue>]>,
+    pub(super) threads: Threads,
+}
+
+impl Simulation<'_> {
+    /// Returns the best settings of a prior of demonstrations of given durations in seconds, and the factors of its bands.
+    pub(super) fn learn(&self, durations: &[f64]) -> Result<(Settings, Calibration)> {
+        let errors = each(self.threads, self.refits, |refit| self.errors(refit))?.concat();
+        let (correlation, settings) = best(&errors);
+        let outcomes = each(self.threads, self.refits, |refit| self.outcomes(refit, correlation, settings))?;
+        Ok((of_duration(settings, correlation, durations), calibration(&outcomes.concat())))
+    }
+
+    /// Returns the number of recordings that are recognised.
+    pub(super) fn n_held_out(&self) -> Result<usize> {
+        let of = |refit: &Refit| Ok(self.held_out(refit)?.len());
+        self.refits.iter().map(of).sum()
+    }
+
+    /// Returns the held-out recordings of a fold with their priors. Without those whose label the others lack.
+    fn held_out(&self, Refit { model, prior, held_out }: &Refit) -> Result<Vec<(&Recording, Prior)>> {
+        let of = |&m: &usize| match self.contexts {
+            None => Some(Ok((&self.recordings[m], prior.clone()))),
+            Some(contexts) => match prior.given(model, &contexts[m]) {
+                Err(Error::Label { .. }) => None,
+                given => Some(given.map(|prior| (&self.recordings[m], prior))),
+            },
+        };
+        held_out.iter().filter_map(of).collect()
+    }
+
+    /// Recognises held-out recordings with every candidate.
+    fn errors(&self, refit: &Refit) -> Result<Vec<SimulatedErrors>> {
+        let of = |(recording, prior): (&Recording, Prior)| {
+            CORRELATION_TIMES.into_iter().map(|time| errors_of_candidates(refit, recording, &prior, time)).collect()
+        };
+        self.held_out(refit)?.into_iter().map(of).collect()
+    }
+
+    /// Recognises held-out recordings with the chosen settings.
+    fn outcomes(&self, refit: &Refit, correlation: f64, settings: Settings) -> Result<Vec<Outcome>> {
+        let mut outcomes = Vec::new();
+        for (recording, prior) in self.held_out(refit)? {
+            let prior = prior.with_settings(refit.settings(settings, correlation))?;
+            let mut recogniser = Recogniser::new(&refit.model, &prior, Timing::default())?;
+            watch(&mut recogniser, recording, |recogniser, share, rest| {
+                outcomes.push(outcome(recogniser, recording, share, rest)?);
+                Ok(())
+            })?;
+        }
+        Ok(outcomes)
+    }
+}
+
+/// Returns the errors of the rest of a recording for each share seen and candidate of a correlation time.
+fn errors_of_candidates(
+    refit: &Refit,
+    recording: &Recording,
+    prior: &Prior,
+    correlation: f64,
+) -> Result<Vec<Vec<f64>>> {
+    let of = |settings| prior.clone().with_settings(refit.settings(settings, correlation));
+    let priors = candidates().map(of).collect::<Result<Vec<_>>>()?;
+    let mut recogniser = Recogniser::with_durations(&refit.model, &priors[0], Timing::default(), N_DURATIONS)?;
+    let mut of_shares = Vec::with_capacity(SHARES.len());
+    watch(&mut recogniser, recording, |recogniser, _, rest| {
+        let step = rest.len().div_ceil(MAX_POSITIONS).max(1);
+        let rest: Vec<_> = rest.iter().step_by(step).collect();
+        let time: Vec<f64> = rest.iter().map(|(time, _)| *time).collect();
+        let error = |prior: &Prior| {
+            recogniser.set_prior(prior.clone());
+            let predicted = recogniser.mean_continuation(&time)?;
+            let square = predicted.indexed_iter().map(|((k, d), mean)| (rest[k].1[d] - mean).powi(2));
+            Ok((square.sum::<f64>() / predicted.len().max(1) as f64).sqrt())
+        };
+        of_shares.push(priors.iter().map(error).collect::<Result<Vec<f64>>>()?);
+        Ok(())
+    })?;
+    Ok(of_shares)
+}
+
+/// Compares an estimate after a share of a recording with the rest of it.
+fn outcome(
+    recogniser: &mut Recogniser,
+    recording: &Recording,
+    share: usize,
+    rest: &[(f64, Vec<f64>)],
+) -> Result<Outcome> {
+    let time: Vec<f64> = rest.iter().map(|(time, _)| *time).collect();
+    let predicted = recogniser.continuation(&time)?;
+    let errors = predicted.position.indexed_iter().zip(&predicted.deviation);
+    let positions = errors.map(|(((k, d), mean), deviation)| (rest[k].1[d] - mean).abs() / deviation).collect();
+    let estimate = recogniser.estimate()?;
+    let errors = estimate.goal().iter().zip(&recording.goal).zip(estimate.goal_deviation());
+    let goals = errors.map(|((mean, goal), deviation)| (mean - goal).abs() / deviation).collect();
+    let duration = (estimate.duration / recording.duration).ln().abs() / estimate.duration_deviation;
+    Ok(Outcome { share, positions, goals, duration, misfit: estimate.surprise })
 }
 
 /// Shows a recording, and calls `compare` after each share with its index and the samples to come.
@@ -114,9 +183,9 @@ fn watch(
 }
 
 /// Fits a model of the same style dimension to the training demonstrations of a fold.
-pub(super) fn refit(model: &Model, demos: &[Demonstration], fold: &Fold) -> Result<Model> {
+fn refit(model: &Model, shown: &Shown, fold: &Fold) -> Result<Model> {
     let bare = |m: &usize| {
-        let demo = &demos[*m];
+        let demo = &shown.demos[*m];
         let sampling = match demo.sampling() {
             Sampling::Unknown => {
                 let n_steps = model.kind().steps(demo.n_samples()) as f64;
@@ -124,7 +193,6 @@ pub(super) fn refit(model: &Model, demos: &[Demonstration], fold: &Fold) -> Resu
             }
             known => known.clone(),
         };
-        // Without contexts, which would cost a map.
         let bare = Demonstration::new(demo.position().to_owned(), sampling)?;
         demo.goal().map_or(Ok(bare.clone()), |goal| bare.with_goal(goal.to_vec()))
     };
@@ -139,5 +207,7 @@ pub(super) fn refit(model: &Model, demos: &[Demonstration], fold: &Fold) -> Resu
     };
     let rank = Truncation::Rank(model.n_styles().min(training.len()));
     let options = FitOptions::new(canonical).n_styles(rank).alpha_z(model.attractor().alpha_z).threads(Threads::ONE);
-    fit(&training, &options)
+    let contexts = shown.contexts.map(|contexts| fold.training.iter().map(|&m| contexts[m].clone()).collect());
+    let map = model.map().map_or(MapSelection::Auto, |map| MapSelection::Given(map.kind()));
+    fit(&training, &FitOptions { contexts, map, ..options })
 }
