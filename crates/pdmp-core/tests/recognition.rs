@@ -156,6 +156,11 @@ fn another_movement_is_surprising() {
     assert!(surprise > 5.0, "{surprise}");
 }
 
+/// Returns the distance of two phases, in cycles.
+fn apart(a: f64, b: f64) -> f64 {
+    ((a - b + 0.5).rem_euclid(1.0) - 0.5).abs()
+}
+
 /// Period and phase of a cycle are known from less than one period.
 #[test]
 fn part_of_a_cycle_gives_period_and_phase() {
@@ -169,7 +174,24 @@ fn part_of_a_cycle_gives_period_and_phase() {
     }
     let estimate = recogniser.estimate().unwrap();
     assert!((estimate.duration / 1.1).ln().abs() < 0.08, "{}", estimate.duration);
-    assert!((estimate.fraction - 109.0 / 110.0 + 0.5).rem_euclid(1.0) - 0.5 < 0.06, "{}", estimate.fraction);
+    assert!(apart(estimate.fraction, 109.0 / 110.0) < 0.03, "{}", estimate.fraction);
+}
+
+/// The hypotheses that a known or common period leaves free are of the phase, which is then known better.
+#[test]
+fn phases_are_finer_where_the_period_is_known() {
+    let demos: Vec<_> = (0..10).map(|k| cycle(0.04 * f64::from(k), 1.1, 110)).collect();
+    let (model, prior) = learnt(&demos, Kind::Rhythmic);
+    let new = cycle(0.22, 1.1, 110);
+    for duration in [None, Some(1.1)] {
+        let mut recogniser = Recogniser::new(&model, &prior, Timing { duration, ..Timing::default() }).unwrap();
+        for k in 0..37 {
+            recogniser.update(0.01 * k as f64, &new.position().row((k + 30) % 110).to_vec()).unwrap();
+        }
+        let estimate = recogniser.estimate().unwrap();
+        assert!(apart(estimate.fraction, 66.0 / 110.0) < 0.006, "{}", estimate.fraction);
+        assert!(recogniser.n_hypotheses() <= 384, "{}", recogniser.n_hypotheses());
+    }
 }
 
 /// Bad input is refused, and the recogniser then remains as it was.

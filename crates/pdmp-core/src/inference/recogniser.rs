@@ -16,12 +16,10 @@ use crate::validate::{check_length, check_number, check_range};
 
 /// Hypotheses of the duration, where the start is known.
 const N_DURATIONS: usize = 64;
-/// Hypotheses of the duration, for each of the start or phase.
-const N_DURATIONS_OF_STARTS: usize = 16;
-/// Hypotheses of the start of a discrete movement.
-const N_STARTS: usize = 16;
-/// Hypotheses of the phase of a rhythmic movement.
-const N_PHASES: usize = 24;
+/// Largest number of hypotheses, where the start or phase is unknown.
+const MAX_HYPOTHESES: usize = 384;
+/// Largest number of hypotheses of the start or phase.
+const MAX_STARTS: usize = 96;
 /// Deviations of the logarithm of the duration beyond the demonstrated range that hypotheses cover.
 const MARGIN: f64 = 1.0;
 
@@ -334,39 +332,32 @@ fn hypotheses(prior: &Prior, timing: Timing, moments: &Moments, n_durations: usi
     check_number("starts", 1, latest)?;
     check_range("starts", latest, latest >= earliest, "must not be before the earliest start")?;
     let rhythmic = prior.kind() == Kind::Rhythmic;
-    let n_starts = if rhythmic {
-        N_PHASES
-    } else if latest > earliest {
-        N_STARTS
-    } else {
-        1
-    };
-    let mut logs = vec![log_mean];
-    match timing.duration {
-        Some(duration) => {
-            check_range(
-                "duration",
-                duration,
-                (1e-9..=1e9).contains(&duration),
-                "seconds must lie between 1e-9 and 1e9",
-            )?;
-            logs[0] = duration.ln();
-        }
-        None => {
-            let n = if n_starts == 1 { n_durations } else { N_DURATIONS_OF_STARTS };
-            let ends = [f64::min, f64::max].map(|end| prior.log_durations().iter().copied().fold(log_mean, end));
-            let (low, high) = (ends[0] - MARGIN * log_deviation, ends[1] + MARGIN * log_deviation);
-            logs = (0..n).map(|k| low + (high - low) * k as f64 / (n - 1) as f64).collect();
-        }
+    let ends = [f64::min, f64::max].map(|end| prior.log_durations().iter().copied().fold(log_mean, end));
+    let (mut low, mut high) = (ends[0] - MARGIN * log_deviation, ends[1] + MARGIN * log_deviation);
+    if let Some(duration) = timing.duration {
+        let valid = (1e-9..=1e9).contains(&duration);
+        check_range("duration", duration, valid, "seconds must lie between 1e-9 and 1e9")?;
+        (low, high) = (duration.ln(), duration.ln());
     }
+    let (n_logs, n_starts) = if !rhythmic && earliest == latest {
+        (if high > low { n_durations } else { 1 }, 1)
+    } else {
+        let turns = if rhythmic { 1.0 } else { (latest - earliest) / log_mean.exp() };
+        // An error of the logarithm of the duration shifts the end of a movement as one of the start does.
+        let n_logs = |n_starts: usize| ((high - low) / turns * n_starts as f64).ceil().min(1e6) as usize + 1;
+        let n_starts = (2..=MAX_STARTS).rev().find(|&n| n * n_logs(n) <= MAX_HYPOTHESES).unwrap_or(2);
+        (n_logs(n_starts).min(MAX_HYPOTHESES / n_starts), n_starts)
+    };
+    let step = (high - low) / (n_logs.max(2) - 1) as f64;
+    let logs = (0..n_logs).map(|k| low + step * k as f64);
     let start = |duration: f64, k: usize| match (rhythmic, n_starts) {
         (true, n) => -(k as f64) / n as f64,
         (false, 1) => earliest / duration,
         (false, n) => (earliest + (latest - earliest) * k as f64 / (n - 1) as f64) / duration,
     };
-    let of = |&log: &f64| {
+    let of = |log: f64| {
         let duration = log.exp();
         (0..n_starts).map(move |k| Hypothesis { duration, log: log - log_mean, start: start(duration, k) })
     };
-    Ok(logs.iter().flat_map(of).collect())
+    Ok(logs.flat_map(of).collect())
 }
