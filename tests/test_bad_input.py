@@ -109,6 +109,10 @@ LISTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: {"C": reaches(), "S": reaches()},
         "demo 0 is a list of demonstrations: put all of them into one list",
     ),
+    "mappings of them": (
+        lambda: [dict(enumerate(reaches())), dict(enumerate(reaches()))],
+        r"demo 0 is a mapping of demonstrations, .*demo for part in parts for demo in part",
+    ),
     "one array": (
         lambda: POSITION,
         rf"demos has shape \[{N}, 2\], expected \(M, T, D\): put a single .* into a list",

@@ -1062,7 +1062,8 @@ fn bad_observations_are_refused_with_a_message() {
     let timing = pdmp_timing { earliest: 1.0, latest: 0.0, duration: ptr::null() };
     let (status, text, _) = new(&bytes, Some(&timing));
     assert!(status == PDMP_RANGE && text.contains("starts"), "{status:?} {text}");
-    let context = |numbers: &[f64]| create(&bytes, pdmp_vector { data: numbers.as_ptr(), length: numbers.len() }, None).0;
+    let context =
+        |numbers: &[f64]| create(&bytes, pdmp_vector { data: numbers.as_ptr(), length: numbers.len() }, None).0;
     assert_eq!([context(&[0.2, 0.3]), context(&[f64::NAN])], [PDMP_LENGTH, PDMP_RANGE]);
 
     let mut recogniser = new(&bytes, None).2.unwrap();

@@ -307,7 +307,18 @@ pub(crate) fn demonstrations(argument: &str, demos: &Bound<'_, PyAny>) -> PyResu
         if let Ok(demo) = item.cast::<Demonstration>() {
             return Ok(demo.get().0.clone());
         }
-        if item.is_instance_of::<PyList>() && item.get_item(0).is_ok_and(|one| one.is_instance_of::<Demonstration>()) {
+        let holds = |many: PyResult<Bound<'_, PyAny>>| {
+            let first = many.and_then(|many| many.try_iter()?.next().transpose());
+            first.is_ok_and(|one| one.is_some_and(|one| one.is_instance_of::<Demonstration>()))
+        };
+        if item.is_instance_of::<PyMapping>() && holds(item.call_method0("values")) {
+            let message = format!(
+                "demo {m} is a mapping of demonstrations, as readers return it: put the values of all into one list, \
+                 [demo for part in parts for demo in part.values()]"
+            );
+            return Err(PyValueError::new_err(message));
+        }
+        if item.is_instance_of::<PyList>() && holds(Ok(item.clone())) {
             let message = format!(
                 "demo {m} is a list of demonstrations: put all of them into one list, or pass a list of lists or a \
                  function that returns an iterator over blocks"

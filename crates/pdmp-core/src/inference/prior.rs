@@ -188,8 +188,7 @@ impl Prior {
     pub fn given<V: Clone + Into<ContextValue>>(&self, model: &Model, context: &[V]) -> Result<Self> {
         self.check_model(model)?;
         let (prediction, durations) = (model.map_of_context()?.predict(context)?.mean, model.predicted_durations());
-        let problem =
-            "does not apply: the prior has no contexts; learn it from a model with contexts, with two demonstrations of each label";
+        let problem = "does not apply: the prior has no contexts; learn it from a model with contexts, with two demonstrations of each label";
         let deviations = self.deviations.as_ref().ok_or(Error::Argument { name: "context", problem })?;
         let n_parameters = self.mixture.parameters.ncols();
         let log_duration = prediction[n_parameters].clamp(durations.start().ln(), durations.end().ln());
