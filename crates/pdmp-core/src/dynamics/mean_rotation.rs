@@ -90,6 +90,16 @@ impl MeanRotation {
         &self.knots
     }
 
+    /// Returns q̄ times a positive number at a clock that is not negative: the value of the spline, without its derivatives.
+    #[inline(always)]
+    pub(crate) fn direction(&self, u: f64) -> F64x4 {
+        let last = self.cells.len() - 1;
+        let x = (u * self.per_unit).min(self.cells.len() as f64);
+        let k = (x as usize).min(last);
+        let (t, [a, b, c, d, e, f]) = (F64x4::splat(x - k as f64), self.cells[k]);
+        ((((f * t + e) * t + d) * t + c) * t + b) * t + a
+    }
+
     /// Returns q̄ with its velocity and acceleration with respect to the clock, in the body frame.
     #[inline(always)]
     pub(crate) fn at(&self, u: f64) -> Turning {

@@ -2,8 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use super::prior::Prior;
+use super::movement_table::MAX_DIRECTIONS;
+use super::prior::{Prior, frame_size};
 use super::recogniser::Recogniser;
+use super::rotations::Layout;
 use super::triangle::row;
 use crate::kind::Kind;
 use crate::model::Conditions;
@@ -15,9 +17,10 @@ use crate::numerics::simd::{F64x4, WIDTH};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     kind: Kind,
-    /// Style (J,), then goal (D,) and start (D,), or anchor (D,).
+    /// Style (J,), then goal (n_q,) and start (n_q,), or anchor (n_q,).
     pub parameters: Vec<f64>,
-    /// Standard deviations of `parameters`.
+    /// Standard deviations of style (J,), then goal (D,) and start (D,), or anchor (D,). Those of a rotation are of the
+    /// components of the rotation vector in rad from its mean, in the frame of angular velocities.
     pub deviations: Vec<f64>,
     /// Style dimension J.
     pub n_styles: usize,
@@ -40,13 +43,14 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    pub(crate) fn new(prior: &Prior) -> Self {
-        let zeros = vec![0.0; prior.parameters().ncols()];
+    pub(crate) fn new(prior: &Prior, layout: &Layout) -> Self {
+        let (kind, n_styles) = (prior.kind(), prior.n_styles());
+        let zeros = |n: usize| vec![0.0; n_styles + frame_size(kind) * n];
         Self {
-            kind: prior.kind(),
-            parameters: zeros.clone(),
-            deviations: zeros,
-            n_styles: prior.n_styles(),
+            kind,
+            parameters: zeros(layout.n_coordinates),
+            deviations: zeros(layout.n_dofs),
+            n_styles,
             duration: 0.0,
             duration_deviation: 0.0,
             arrival: 0.0,
@@ -62,19 +66,21 @@ impl Estimate {
         &self.parameters[..self.n_styles]
     }
 
-    /// Returns the goal (D,), or the anchor of a rhythmic movement.
+    /// Returns the goal (n_q,), or the anchor of a rhythmic movement.
     pub fn goal(&self) -> &[f64] {
-        &self.parameters[self.n_styles..self.n_styles + self.n_dofs()]
+        let positions = &self.parameters[self.n_styles..];
+        &positions[..positions.len() / frame_size(self.kind)]
+    }
+
+    /// Returns the start (n_q,); empty for a rhythmic movement.
+    pub fn start(&self) -> &[f64] {
+        &self.parameters[self.n_styles + self.goal().len()..]
     }
 
     /// Returns the standard deviations (D,) of the goal or anchor.
     pub fn goal_deviation(&self) -> &[f64] {
-        &self.deviations[self.n_styles..self.n_styles + self.n_dofs()]
-    }
-
-    fn n_dofs(&self) -> usize {
-        let per_dof = if self.kind == Kind::Discrete { 2 } else { 1 };
-        (self.parameters.len() - self.n_styles) / per_dof
+        let positions = &self.deviations[self.n_styles..];
+        &positions[..positions.len() / frame_size(self.kind)]
     }
 
     /// Returns the conditions of the whole movement. A cycle continues from the phase of the last observation.
@@ -87,7 +93,7 @@ impl Estimate {
         };
         match self.kind {
             Kind::Discrete => {
-                let start = Some(self.parameters[self.n_styles + self.n_dofs()..].to_vec());
+                let start = Some(self.start().to_vec());
                 Conditions { goal, start, ..conditions }
             }
             Kind::Rhythmic => Conditions { anchor: goal, phase: Some(TAU * self.fraction), ..conditions },
@@ -102,7 +108,7 @@ impl Recogniser {
         let clock = self.clock;
         let (mut log, mut log_square, mut arrival) = (0.0, 0.0, 0.0);
         let (mut fraction, mut fraction_square, mut turn) = (0.0, 0.0, [0.0; 2]);
-        let Self { beliefs, hypotheses, estimate, table, scratch, .. } = self;
+        let Self { beliefs, hypotheses, estimate, table, scratch, layout, parameters, .. } = self;
         let rhythmic = estimate.kind == Kind::Rhythmic;
         let weights = beliefs.iter().flat_map(|belief| belief.weight.to_array());
         for (weight, hypothesis) in weights.zip(&*hypotheses) {
@@ -120,13 +126,28 @@ impl Recogniser {
         let (mean, covariance) = scratch.moments(beliefs);
         for (k, directions) in table.directions.rows().into_iter().enumerate() {
             let directions = directions.as_slice().unwrap_or_default();
-            estimate.parameters[k] = table.mean[k] + dot(directions, mean);
-            let mut square = 0.0;
-            for (i, own) in directions.iter().enumerate() {
-                let entries = &covariance[row(i)..=row(i) + i];
-                square += own * (2.0 * dot(entries, &directions[..i]) + entries[i] * own);
+            parameters[k] = table.mean[k] + dot(directions, mean);
+            estimate.deviations[k] = deviation(covariance, directions);
+        }
+        let (style, positions) = parameters.split_at(estimate.n_styles);
+        estimate.parameters[..style.len()].copy_from_slice(style);
+        let outside = estimate.parameters[style.len()..].chunks_exact_mut(layout.n_coordinates);
+        for (part, (dofs, position)) in positions.chunks_exact(layout.n_dofs).zip(outside).enumerate() {
+            let u = layout.clocks()[part];
+            layout.write(u, dofs, position);
+            for rotation in layout.rotations() {
+                let map = layout.tangent(rotation.read(dofs), rotation.columns.read(position));
+                let first = style.len() + part * layout.n_dofs + rotation.dof;
+                for (i, map) in map.iter().enumerate() {
+                    let mut along = [0.0; MAX_DIRECTIONS];
+                    let along = &mut along[..mean.len()];
+                    for (j, factor) in map.iter().enumerate() {
+                        let own = table.directions.row(first + j);
+                        along.iter_mut().zip(own).for_each(|(sum, own)| *sum += factor * own);
+                    }
+                    estimate.deviations[first + i] = deviation(covariance, along);
+                }
             }
-            estimate.deviations[k] = square.max(0.0).sqrt();
         }
         // The duration of the first hypothesis gives the mean of the demonstrations.
         let duration = (log - hypotheses[0].log).exp() * hypotheses[0].duration;
@@ -175,6 +196,16 @@ impl Recogniser {
         }
         sum.max(0.0) / self.n_observed.max(1) as f64
     }
+}
+
+/// Returns the standard deviation along a direction (q,), for the lower triangle of a covariance (q, q).
+fn deviation(covariance: &[f64], direction: &[f64]) -> f64 {
+    let mut square = 0.0;
+    for (i, own) in direction.iter().enumerate() {
+        let entries = &covariance[row(i)..=row(i) + i];
+        square += own * (2.0 * dot(entries, &direction[..i]) + entries[i] * own);
+    }
+    square.max(0.0).sqrt()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -19,6 +19,7 @@ mod passage;
 mod pauses;
 pub(crate) mod prior;
 pub(crate) mod recogniser;
+mod rotations;
 mod triangle;
 mod via_points;
 
@@ -29,6 +30,7 @@ pub use estimate::Estimate;
 pub(crate) use movement_table::responses;
 pub use prior::{Mixture, Prior, Settings};
 pub use recogniser::{Recogniser, Timing};
+pub(crate) use rotations::Layout;
 pub use via_points::{At, Passage, PassageOptions, ViaPoint, through};
 
 #[cfg(all(test, feature = "learning"))]

@@ -28,6 +28,13 @@ pub(crate) struct Place {
     weight: f64,
 }
 
+impl Place {
+    /// Returns the fraction of the duration or period.
+    pub(crate) fn share(self) -> f64 {
+        (self.index as f64 + self.weight) / STEPS as f64
+    }
+}
+
 /// Movements y(u) = Φ(u)θ, tabulated for θ = μ + k·(log T − mean of log T) + L·x with independent x of unit variance.
 ///
 /// The columns of L are ordered by the mean square of their movements, relative to the variance of the residual; directions

@@ -54,13 +54,13 @@ impl Sums {
     }
 }
 
-/// Kernel that includes the positions (D,) at one time, of which missing ones have no gain.
+/// Kernel that includes the positions (D,) at one time under four hypotheses. Missing ones have no gain.
 pub(crate) struct Observe<'a> {
     pub(crate) sums: &'a mut Sums,
     pub(crate) table: &'a MovementTable,
     pub(crate) places: [Place; WIDTH],
     pub(crate) noise: &'a NoiseFilter,
-    pub(crate) position: &'a [f64],
+    pub(crate) position: &'a [F64x4],
     /// Memory (D, w) of whitened rows, with zeros past the first q + 1 columns.
     pub(crate) rows: &'a mut [F64x4],
 }
@@ -85,7 +85,7 @@ impl Kernel for Observe<'_> {
             let row = &mut rows[n_rows * width..][..width];
             n_rows += 1;
             table.rows::<T>(&places, d, row);
-            row[q] = (T::splat(position[d]) - T::load(&row[q])).store();
+            row[q] = (T::load(&position[d]) - T::load(&row[q])).store();
             let (gain, scale) = (T::splat(gain), T::splat(scale));
             for k in 0..width {
                 let before = T::load(&process[k]) * decay;

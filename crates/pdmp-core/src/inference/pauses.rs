@@ -7,6 +7,7 @@ use super::noise_filter::{NoiseFilter, WHITE};
 use super::observation::Sums;
 use super::prior::Prior;
 use super::recogniser::Recogniser;
+use super::rotations::{Layout, Sample};
 use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, compute};
 
 /// Length of the windows over which speeds are compared, in mean durations.
@@ -49,9 +50,12 @@ pub(crate) struct Pauses {
     pub(crate) stopped: bool,
     /// Time of the begin of the window, in seconds.
     since: f64,
-    /// Positions (D,) and predicted velocities (D,) at the begin of the window, or where it rests.
-    anchor: Vec<f64>,
+    /// Position and predicted velocities (D,) at the begin of the window, or where it rests.
+    anchor: Sample,
     velocity: Vec<f64>,
+    /// Memory of a displacement (D,), and of the ends of a window under four hypotheses (D,).
+    moved: Vec<f64>,
+    ends: [Vec<F64x4>; 2],
     /// The recogniser at the begin of the last window that was not slow.
     saved: Saved,
 }
@@ -63,7 +67,7 @@ struct Saved {
     n_observed: usize,
     noise: NoiseFilter,
     sums: Vec<Sums>,
-    anchor: Vec<f64>,
+    anchor: Sample,
     velocity: Vec<f64>,
     /// Weights of the hypotheses, and means (q,) of each four of them.
     weights: Vec<F64x4>,
@@ -71,19 +75,25 @@ struct Saved {
 }
 
 impl Pauses {
-    pub(crate) fn new(prior: &Prior, noise: &NoiseFilter, sums: &[Sums], n_directions: usize) -> Self {
+    pub(crate) fn new(
+        prior: &Prior,
+        layout: &Layout,
+        noise: &NoiseFilter,
+        sums: &[Sums],
+        table: &MovementTable,
+    ) -> Self {
         let logs = prior.log_durations();
-        let missing = vec![f64::NAN; prior.residual().len()];
+        let (missing, unknown) = (Sample::missing(layout), vec![f64::NAN; layout.n_dofs]);
         let (noise, sums) = (noise.clone(), sums.to_vec());
         let saved = Saved {
             clock: 0.0,
             n_observed: 0,
             noise,
             weights: vec![F64x4::ZERO; sums.len()],
-            means: vec![F64x4::ZERO; sums.len() * n_directions],
+            means: vec![F64x4::ZERO; sums.len() * table.n_directions],
             sums,
             anchor: missing.clone(),
-            velocity: missing.clone(),
+            velocity: unknown.clone(),
         };
         Self {
             duration: (logs.iter().sum::<f64>() / logs.len() as f64).exp(),
@@ -91,8 +101,10 @@ impl Pauses {
             probability: 0.0,
             stopped: false,
             since: f64::NEG_INFINITY,
-            anchor: missing.clone(),
-            velocity: missing,
+            anchor: missing,
+            moved: unknown.clone(),
+            velocity: unknown,
+            ends: [(); 2].map(|()| vec![F64x4::ZERO; layout.n_dofs]),
             saved,
         }
     }
@@ -104,10 +116,11 @@ impl Pauses {
 
     /// Returns the observed speed relative to the predicted one, and the logarithm of the ratio of the likelihoods of a pause
     /// and of a movement that goes on.
-    fn compare(&self, span: f64, position: &[f64]) -> (f64, f64) {
+    fn compare(&mut self, span: f64, sample: &Sample, layout: &Layout) -> (f64, f64) {
         let (mut moved, mut predicted) = (0.0, 0.0);
-        for (d, y) in position.iter().enumerate() {
-            let (own, expected) = (y - self.anchor[d], span * self.velocity[d]);
+        layout.change(&self.anchor, sample, &mut self.moved);
+        for (d, &own) in self.moved.iter().enumerate() {
+            let expected = span * self.velocity[d];
             if !(own + expected).is_nan() {
                 // The squares of the noise add one of each DoF.
                 moved += own * own / self.variances[d] - 1.0;
@@ -124,8 +137,8 @@ impl Pauses {
     }
 
     /// Includes a window, and returns its speed and ratio as [`Self::compare`] does.
-    fn filter(&mut self, span: f64, position: &[f64]) -> (f64, f64) {
-        let (speed, log_ratio) = self.compare(span, position);
+    fn filter(&mut self, span: f64, sample: &Sample, layout: &Layout) -> (f64, f64) {
+        let (speed, log_ratio) = self.compare(span, sample, layout);
         let steps = span / self.duration;
         let (stays, begins) = ((-steps / LENGTH).exp(), 1.0 - (-steps * RATE).exp());
         let before = self.probability * stays + (1.0 - self.probability) * begins;
@@ -138,14 +151,14 @@ impl Pauses {
 impl Recogniser {
     /// Compares the displacement with the predicted one at the end of a window: stops the clock, lets it run on, or begins
     /// the next window.
-    pub(crate) fn watch(&mut self, time: f64, position: &[f64]) {
-        let Some(pauses) = &mut self.pauses else { return };
+    pub(crate) fn watch(&mut self, time: f64) {
+        let Self { pauses: Some(pauses), sample, layout, .. } = self else { return };
         let span = time - pauses.since;
         if span < WINDOW * pauses.duration {
             return;
         }
         let unknown = pauses.velocity[0].is_nan();
-        let (speed, log_ratio) = if unknown { (1.0, 0.0) } else { pauses.filter(span, position) };
+        let (speed, log_ratio) = if unknown { (1.0, 0.0) } else { pauses.filter(span, sample, layout) };
         match (pauses.stopped, pauses.probability > if pauses.stopped { RESUME } else { STOP }) {
             (true, true) => pauses.since = time,
             (false, true) => {
@@ -153,7 +166,7 @@ impl Recogniser {
                 (self.clock, self.n_observed) = (*clock, *n_observed);
                 self.noise.copy_from(noise);
                 self.sums.iter_mut().zip(sums).for_each(|(to, from)| to.copy_from(from));
-                pauses.anchor.copy_from_slice(anchor);
+                pauses.anchor.copy_from(anchor);
                 pauses.velocity.copy_from_slice(velocity);
                 (pauses.stopped, pauses.since) = (true, time);
             }
@@ -161,22 +174,22 @@ impl Recogniser {
                 pauses.stopped = false;
                 if stopped {
                     // The way from where it rested gives the time since when it goes on.
-                    self.include(span * speed.min(MAX_SPEED), position);
+                    self.include(span * speed.min(MAX_SPEED));
                 }
-                self.begin_window(time, position, log_ratio <= 0.0);
+                self.begin_window(time, log_ratio <= 0.0);
             }
         }
     }
 
     /// Begins a window, and keeps the state if it is one of a movement that goes on. The velocity is that of the state that
     /// is kept: later observations, of a pause, would be taken for a slow movement.
-    fn begin_window(&mut self, time: f64, position: &[f64], keep: bool) {
+    fn begin_window(&mut self, time: f64, keep: bool) {
         let known = !keep || self.weigh().is_ok();
-        let Self { pauses, beliefs, fours, table, rows, .. } = self;
+        let Self { pauses, beliefs, fours, table, rows, layout, sample, .. } = self;
         let Some(pauses) = pauses else { return };
-        let Pauses { saved, velocity, .. } = pauses;
+        let Pauses { saved, velocity, ends, .. } = pauses;
         pauses.since = time;
-        pauses.anchor.copy_from_slice(position);
+        pauses.anchor.copy_from(sample);
         if keep && known {
             let means = saved.means.chunks_exact_mut(table.n_directions);
             for ((belief, weight), mean) in beliefs.iter().zip(&mut saved.weights).zip(means) {
@@ -192,47 +205,46 @@ impl Recogniser {
             if known && weight != F64x4::ZERO {
                 let places = [self.clock, self.clock + window].map(|clock| table.places(four.fraction(clock)));
                 let scale = F64x4::splat((sum * window).recip());
-                compute(Advance { weight: weight * scale, mean, table, places, rows, velocity });
+                for (&place, ends) in places.iter().zip(&mut *ends) {
+                    compute(Predict { mean, table, places: place, row: &mut rows[..table.width], positions: ends });
+                }
+                layout.add_changes(places, ends, weight * scale, velocity);
             }
         }
         if keep {
             (saved.clock, saved.n_observed) = (self.clock, self.n_observed);
             saved.noise.copy_from(&self.noise);
             saved.sums.iter_mut().zip(&self.sums).for_each(|(to, from)| to.copy_from(from));
-            saved.anchor.copy_from_slice(&pauses.anchor);
+            saved.anchor.copy_from(&pauses.anchor);
             saved.velocity.copy_from_slice(velocity);
         }
     }
 }
 
-/// Kernel that adds the mean displacements between two places, by weight.
-struct Advance<'a> {
-    weight: F64x4,
+/// Kernel that computes the mean positions of the DoFs (D,) at four places.
+struct Predict<'a> {
     mean: &'a [F64x4],
     table: &'a MovementTable,
-    places: [[Place; WIDTH]; 2],
-    /// Memory of two rows (w,).
-    rows: &'a mut [F64x4],
-    velocity: &'a mut [f64],
+    places: [Place; WIDTH],
+    /// Memory of a row (w,).
+    row: &'a mut [F64x4],
+    positions: &'a mut [F64x4],
 }
 
-impl Kernel for Advance<'_> {
+impl Kernel for Predict<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<T: Register>(self) {
-        let Self { weight, mean, table, places: [from, to], rows, velocity } = self;
-        let (q, width) = (table.n_directions, table.width);
-        let (before, after) = rows[..2 * width].split_at_mut(width);
-        let weight = T::load(&weight);
-        for d in 0..velocity.len() {
-            table.rows::<T>(&from, d, before);
-            table.rows::<T>(&to, d, after);
-            let mut sum = T::load(&after[q]) - T::load(&before[q]);
+        let Self { mean, table, places, row, positions } = self;
+        let q = table.n_directions;
+        for d in 0..positions.len() {
+            table.rows::<T>(&places, d, row);
+            let mut sum = T::load(&row[q]);
             for i in 0..q {
-                sum = sum + (T::load(&after[i]) - T::load(&before[i])) * T::load(&mean[i]);
+                sum = sum + T::load(&row[i]) * T::load(&mean[i]);
             }
-            velocity[d] += (sum * weight).store().reduce_add();
+            positions[d] = sum.store();
         }
     }
 }

@@ -276,7 +276,9 @@ impl Prior {
 
     /// Computes the moments of the demonstrations. The covariance is shrunk towards its diagonal (O. Ledoit, M. Wolf,
     /// J. Multivar. Anal. 88, 2004), since it is singular with fewer demonstrations than parameters.
-    pub(crate) fn moments(&self) -> Moments {
+    ///
+    /// The diagonal is that of any frame: the three components of each of the `vectors`, by its first DoF, share their mean.
+    pub(crate) fn moments(&self, vectors: &[usize]) -> Moments {
         let n = self.n_demos() as f64;
         let Mixture { parameters, log_durations, .. } = &self.mixture;
         let mean = parameters.sum_axis(Axis(0)) / n;
@@ -286,7 +288,12 @@ impl Prior {
         let log_variance = logs.dot(&logs) / n + MIN_LOG_DEVIATION * MIN_LOG_DEVIATION;
         let slope = deviations.t().dot(&logs) * ((1.0 - SHRINKAGE) / n / log_variance);
         let mut covariance = deviations.t().dot(&deviations) / n;
-        let diagonal = covariance.diag().to_owned();
+        let mut diagonal = covariance.diag().to_owned();
+        let positions = (self.n_styles..diagonal.len()).step_by(self.residual.len());
+        for first in positions.flat_map(|position| vectors.iter().map(move |dof| position + dof)) {
+            let mean = (0..3).map(|i| diagonal[first + i]).sum::<f64>() / 3.0;
+            (0..3).for_each(|i| diagonal[first + i] = mean);
+        }
         // A parameter that does not vary keeps a small variance, so that the covariance is regular.
         let least = 1e-9 * diagonal.sum() / diagonal.len() as f64 + f64::MIN_POSITIVE.sqrt();
         covariance *= 1.0 - SHRINKAGE;

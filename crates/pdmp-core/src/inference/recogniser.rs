@@ -8,11 +8,12 @@ use super::noise_filter::NoiseFilter;
 use super::observation::{Hypotheses, Observe, Sums};
 use super::pauses::Pauses;
 use super::prior::{Moments, Prior};
+use super::rotations::{Layout, Sample};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::Model;
 use crate::numerics::simd::{F64x4, WIDTH, compute};
-use crate::validate::{check_length, check_number, check_range};
+use crate::validate::{check_number, check_range};
 
 /// Hypotheses of the duration, where the start is known.
 const N_DURATIONS: usize = 64;
@@ -117,6 +118,14 @@ pub struct Recogniser {
     pub(crate) beliefs: Vec<Belief>,
     pub(crate) scratch: Scratch,
     pub(crate) rows: Vec<F64x4>,
+    pub(crate) layout: Layout,
+    /// The last observation.
+    pub(crate) sample: Sample,
+    /// Positions of the DoFs (D,) under four hypotheses, and their variances.
+    pub(crate) lanes: Vec<F64x4>,
+    pub(crate) variances: Vec<f64>,
+    /// Parameters (K,) in degrees of freedom.
+    pub(crate) parameters: Vec<f64>,
     /// Times of the first and the last observation, in seconds.
     pub(crate) times: Option<[f64; 2]>,
     /// Time from the first to the last observation without pauses, in seconds.
@@ -133,11 +142,11 @@ impl Recogniser {
     /// Creates the recogniser of a model with a prior of its parameters.
     ///
     /// # Errors
-    /// A prior of another model, a model with rotations or a time warp, or times that are not finite.
+    /// A prior of another model, a model with a time warp, or times that are not finite.
     pub fn new(model: &Model, prior: &Prior, timing: Timing) -> Result<Self> {
         let mut recogniser = Self::with_durations(model, prior, timing, N_DURATIONS)?;
         recogniser.pauses =
-            Some(Pauses::new(prior, &recogniser.noise, &recogniser.sums, recogniser.table.n_directions));
+            Some(Pauses::new(prior, &recogniser.layout, &recogniser.noise, &recogniser.sums, &recogniser.table));
         Ok(recogniser)
     }
 
@@ -145,7 +154,8 @@ impl Recogniser {
     pub(crate) fn with_durations(model: &Model, prior: &Prior, timing: Timing, n_durations: usize) -> Result<Self> {
         prior.check_model(model)?;
         check_linear(model)?;
-        let moments = prior.moments();
+        let layout = Layout::new(model.primitive());
+        let moments = prior.moments(&layout.vectors);
         let table = MovementTable::new(model.primitive(), prior, &moments)?;
         let kernels = Kernels::new(prior, &moments, &table);
         let hypotheses = hypotheses(prior, timing, &moments, n_durations)?;
@@ -161,7 +171,12 @@ impl Recogniser {
             pauses: None,
             n_observed: 0,
             stage: Stage::Observed,
-            estimate: Estimate::new(prior),
+            estimate: Estimate::new(prior, &layout),
+            sample: Sample::missing(&layout),
+            lanes: vec![F64x4::ZERO; layout.n_dofs],
+            variances: vec![0.0; layout.n_dofs],
+            parameters: moments.mean.clone(),
+            layout,
             prior: prior.clone(),
             table,
             kernels,
@@ -183,16 +198,14 @@ impl Recogniser {
         self.hypotheses.len()
     }
 
-    /// Includes the positions (D,) at a time in seconds. A missing degree of freedom is NaN; the interval to the time
-    /// before is arbitrary. Does not allocate.
+    /// Includes the position (n_q,) at a time in seconds. A missing coordinate is NaN, and a rotation with one is missing;
+    /// the interval to the time before is arbitrary. A rotation is one of less than half a turn from the mean of the
+    /// demonstrations; the sign of its quaternion does not matter. Does not allocate.
     ///
     /// # Errors
-    /// A time that is not after the one before, or a wrong number of positions, or an infinite one. The recogniser then
-    /// remains as it was.
+    /// A time that is not after the one before, a wrong number of coordinates, an infinite one, or a quaternion whose norm is
+    /// not 1. The recogniser then remains as it was.
     pub fn update(&mut self, time: f64, position: &[f64]) -> Result<()> {
-        check_length("position", position.len(), self.prior.residual().len(), "DoF")?;
-        let mut observed = position.iter().enumerate().filter(|(_, y)| !y.is_nan());
-        observed.try_for_each(|(d, &y)| check_number("position", d, y))?;
         check_number("time", 0, time)?;
         let (first, interval) = match self.times {
             None => (time, 0.0),
@@ -206,24 +219,27 @@ impl Recogniser {
                 (first, time - last)
             }
         };
+        self.layout.read(position, &mut self.sample)?;
         self.times = Some([first, time]);
         self.stage = Stage::Observed;
         if self.pauses.as_ref().is_none_or(|pauses| !pauses.stopped) {
-            self.include(interval, position);
+            self.include(interval);
         }
-        self.watch(time, position);
+        self.watch(time);
         Ok(())
     }
 
-    /// Includes positions (D,) after an interval in seconds of the clock.
-    pub(crate) fn include(&mut self, interval: f64, position: &[f64]) {
+    /// Includes the sample after an interval in seconds of the clock.
+    pub(crate) fn include(&mut self, interval: f64) {
         self.clock += interval;
-        self.n_observed += position.iter().filter(|y| !y.is_nan()).count();
-        self.noise.advance(interval, position);
-        let Self { table, noise, rows, .. } = self;
+        self.n_observed += self.sample.dofs.iter().filter(|y| !y.is_nan()).count();
+        self.noise.advance(interval, &self.sample.dofs);
+        let Self { table, noise, rows, layout, sample, lanes, .. } = self;
+        layout.spread(sample, lanes);
         for (four, sums) in self.fours.iter().zip(&mut self.sums) {
             let places = table.places(four.fraction(self.clock));
-            compute(Observe { sums, table, places, noise, position, rows });
+            layout.about_means(sample, &places, lanes);
+            compute(Observe { sums, table, places, noise, position: lanes, rows });
         }
     }
 
@@ -285,7 +301,7 @@ impl Recogniser {
 
     /// Changes the settings of the prior other than the correlation time, and keeps the observations.
     pub(crate) fn set_prior(&mut self, prior: Prior) {
-        self.kernels = Kernels::new(&prior, &prior.moments(), &self.table);
+        self.kernels = Kernels::new(&prior, &prior.moments(&self.layout.vectors), &self.table);
         // The number of components depends on the bandwidth.
         self.beliefs.fill(Belief::new(&self.kernels));
         self.scratch = Scratch::new(&self.kernels);
@@ -301,12 +317,9 @@ impl Recogniser {
 
 /// Checks that the movements of a model are linear in parameters at a clock that is linear in time.
 pub(crate) fn check_linear(model: &Model) -> Result<()> {
-    let unsuitable = |problem| Err(Error::Argument { name: "model", problem });
-    if model.primitive().coordinates().is_some() {
-        return unsuitable("has rotations, for which there is no recognition: fit the positions alone");
-    }
     if model.breaks().len() > 2 {
-        return unsuitable("has a time warp, for which there is no recognition: fit it with linear time");
+        let problem = "has a time warp, for which there is no recognition: fit it with linear time";
+        return Err(Error::Argument { name: "model", problem });
     }
     Ok(())
 }

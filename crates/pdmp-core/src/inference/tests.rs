@@ -41,7 +41,7 @@ pub(super) fn prior(model: &Model, bandwidth: f64) -> Prior {
 }
 
 /// Normal random number, the sum of twelve uniform ones.
-fn normal(random: &mut Random) -> f64 {
+pub(super) fn normal(random: &mut Random) -> f64 {
     (0..12).map(|_| random.next()).sum::<f64>() - 6.0
 }
 
@@ -95,7 +95,7 @@ fn a_hypothesis_equals_dense_conditioning_of_the_mixture() {
     let model = model();
     for (bandwidth, timing) in [(0.4, 0.95), (1.0, 1.1)] {
         let prior = prior(&model, bandwidth);
-        let moments = prior.moments();
+        let moments = prior.moments(&[]);
         let table = MovementTable::new(model.primitive(), &prior, &moments).unwrap();
         let kernels = Kernels::new(&prior, &moments, &table);
         let timing = Timing { duration: Some(timing), ..Timing::default() };
@@ -177,7 +177,7 @@ fn bands_hold_movements_of_the_prior() {
     let model = model();
     let (bandwidth, mut random) = (0.5, Random(11));
     let prior = prior(&model, bandwidth);
-    let moments = prior.moments();
+    let moments = prior.moments(&[]);
     let responses = super::responses(model.primitive()).unwrap();
     let n = moments.mean.len();
     let factor = DMatrix::from_fn(n, n, |i, j| moments.covariance[[i, j]]).cholesky().unwrap().l();

@@ -12,7 +12,7 @@ use crate::demonstration::{ContextValue, Demonstration};
 use crate::error::{Error, Result};
 use crate::inference::prior::MIN_DEMOS;
 use crate::inference::recogniser::check_linear;
-use crate::inference::{Calibration, Mixture, Prior, Settings};
+use crate::inference::{Calibration, Layout, Mixture, Prior, Settings};
 use crate::model::Model;
 use crate::numerics::threads::Threads;
 use crate::validate::check_length;
@@ -49,7 +49,7 @@ const MIN_RESIDUAL: f64 = 0.02;
 ///
 /// # Errors
 /// Other demonstrations than those of the model, fewer than four, fewer than two groups or three demonstrations outside
-/// of one, or a model with rotations or a time warp.
+/// of one, or a model with a time warp.
 pub fn learn_prior(
     model: &Model,
     demos: &[Demonstration],
@@ -128,30 +128,37 @@ fn prior_of(model: &Model, recordings: &[&Recording]) -> Result<Prior> {
     prior.with_deviations(mixture(map.deviations(contexts, outputs.view())?.view()))
 }
 
-/// Returns the root mean square deviation (D,) of the recordings from their reproductions, at least [`MIN_RESIDUAL`].
+/// Returns the root mean square deviation (D,) of the recordings from their reproductions, at least [`MIN_RESIDUAL`]. The
+/// components of rotations, and those of the points of poses, share theirs.
 fn residual(model: &Model, recordings: &[&Recording], parameters: &Array2<f64>) -> Result<Vec<f64>> {
     let n_dofs = model.n_dofs();
     let responses = crate::inference::responses(model.primitive())?;
     let steps = responses.nrows() / n_dofs - 1;
     let (mut squares, mut sums, mut totals, mut n) = (vec![0.0; n_dofs], vec![0.0; n_dofs], vec![0.0; n_dofs], 0.0);
+    let (layout, mut positions, mut dofs) = (Layout::new(model.primitive()), Vec::new(), vec![0.0; n_dofs]);
     for (recording, parameters) in recordings.iter().zip(parameters.rows()) {
         let reproduced = responses.dot(&parameters);
         for (time, position) in recording.samples() {
             let place = time / recording.duration * steps as f64;
             let index = (place as usize).min(steps - 1);
-            for (d, y) in position.iter().enumerate() {
+            layout.dofs(time / recording.duration, &position, &mut dofs);
+            for (d, y) in dofs.iter().enumerate() {
                 let [below, above] = [index, index + 1].map(|k| reproduced[k * n_dofs + d]);
                 squares[d] += (y - below - (place - index as f64) * (above - below)).powi(2);
                 sums[d] += y;
                 totals[d] += y * y;
             }
             n += 1.0;
+            positions.push(position);
         }
     }
     let scale = model.ranges().iter().copied().fold(0.0, f64::max);
-    let of = |d: usize| {
-        let variance = (totals[d] - sums[d] * sums[d] / n).max(0.0) / n;
-        (squares[d] / n + MIN_RESIDUAL * MIN_RESIDUAL * variance).sqrt().max(1e-6 * scale).max(f64::MIN_POSITIVE.sqrt())
-    };
-    Ok((0..n_dofs).map(of).collect())
+    let mut variances: Vec<f64> = (0..n_dofs).map(|d| (totals[d] - sums[d] * sums[d] / n).max(0.0) / n).collect();
+    layout.set_variances(&positions, &mut variances);
+    for (variance, square) in variances.iter_mut().zip(&squares) {
+        *variance = square / n + MIN_RESIDUAL * MIN_RESIDUAL * *variance;
+    }
+    layout.share(&mut variances);
+    let least = (1e-6 * scale).max(f64::MIN_POSITIVE.sqrt());
+    Ok(variances.into_iter().map(|variance| variance.sqrt().max(least)).collect())
 }

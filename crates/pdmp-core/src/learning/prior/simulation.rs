@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::inference::{Calibration, Prior, Recogniser, SHARES, Settings, Timing};
 use crate::learning::factorization::Truncation;
 use crate::learning::fit::fit;
-use crate::learning::options::{CanonicalOptions, FitOptions};
+use crate::learning::options::{CanonicalOptions, DofScaling, FitOptions};
 use crate::model::Model;
 use crate::numerics::threads::Threads;
 
@@ -129,6 +129,7 @@ fn errors_of_candidates(
     let priors = candidates().map(of).collect::<Result<Vec<_>>>()?;
     let mut recogniser = Recogniser::with_durations(&refit.model, &priors[0], Timing::default(), N_DURATIONS)?;
     let mut of_shares = Vec::with_capacity(SHARES.len());
+    let (mut errors, scale) = (vec![0.0; refit.model.n_dofs()], scale(&refit.model));
     watch(&mut recogniser, recording, |recogniser, _, rest| {
         let step = rest.len().div_ceil(MAX_POSITIONS).max(1);
         let rest: Vec<_> = rest.iter().step_by(step).collect();
@@ -136,8 +137,12 @@ fn errors_of_candidates(
         let error = |prior: &Prior| {
             recogniser.set_prior(prior.clone());
             let predicted = recogniser.mean_continuation(&time)?;
-            let square = predicted.indexed_iter().map(|((k, d), mean)| (rest[k].1[d] - mean).powi(2));
-            Ok((square.sum::<f64>() / predicted.len().max(1) as f64).sqrt())
+            let mut square = 0.0;
+            for (predicted, (_, position)) in predicted.rows().into_iter().zip(&rest) {
+                recogniser.layout.errors(&predicted.to_vec(), position, &mut errors);
+                errors.iter().zip(&scale).for_each(|(error, scale)| square += (error / scale).powi(2));
+            }
+            Ok((square / (rest.len() * scale.len()).max(1) as f64).sqrt())
         };
         of_shares.push(priors.iter().map(error).collect::<Result<Vec<f64>>>()?);
         Ok(())
@@ -154,13 +159,30 @@ fn outcome(
 ) -> Result<Outcome> {
     let time: Vec<f64> = rest.iter().map(|(time, _)| *time).collect();
     let predicted = recogniser.continuation(&time)?;
-    let errors = predicted.position.indexed_iter().zip(&predicted.deviation);
-    let positions = errors.map(|(((k, d), mean), deviation)| (rest[k].1[d] - mean).abs() / deviation).collect();
-    let estimate = recogniser.estimate()?;
-    let errors = estimate.goal().iter().zip(&recording.goal).zip(estimate.goal_deviation());
-    let goals = errors.map(|((mean, goal), deviation)| (mean - goal).abs() / deviation).collect();
+    recogniser.estimate()?;
+    let (layout, estimate) = (&recogniser.layout, &recogniser.estimate);
+    let mut errors = vec![0.0; layout.n_dofs];
+    let mut relative = |predicted: &[f64], position: &[f64], deviations: &[f64]| {
+        layout.errors(predicted, position, &mut errors);
+        errors.iter().zip(deviations).map(|(error, deviation)| error.abs() / deviation).collect::<Vec<f64>>()
+    };
+    let mut positions = Vec::with_capacity(predicted.deviation.len());
+    let rows = predicted.position.rows().into_iter().zip(predicted.deviation.rows());
+    for ((predicted, deviations), (_, position)) in rows.zip(rest) {
+        positions.extend(relative(&predicted.to_vec(), position, &deviations.to_vec()));
+    }
+    let goals = relative(estimate.goal(), &recording.goal(layout), estimate.goal_deviation());
     let duration = (estimate.duration / recording.duration).ln().abs() / estimate.duration_deviation;
     Ok(Outcome { share, positions, goals, duration, misfit: estimate.surprise })
+}
+
+/// Returns the unit (D,) in which errors count: that of the factorisation of a model with rotations, whose angles and lengths
+/// have none in common.
+fn scale(model: &Model) -> Vec<f64> {
+    match model.primitive().coordinates() {
+        Some(_) => model.learnt().dof_scale.clone(),
+        None => vec![1.0; model.n_dofs()],
+    }
 }
 
 /// Shows a recording, and calls `compare` after each share with its index and the samples to come.
@@ -193,7 +215,10 @@ fn refit(model: &Model, shown: &Shown, fold: &Fold) -> Result<Model> {
             }
             known => known.clone(),
         };
-        let bare = Demonstration::new(demo.position().to_owned(), sampling)?;
+        let mut bare = Demonstration::new(demo.position().to_owned(), sampling)?;
+        if let Some(coordinates) = model.primitive().coordinates() {
+            bare = bare.with_rotations(coordinates.columns())?.with_units(coordinates.units().to_vec())?;
+        }
         demo.goal().map_or(Ok(bare.clone()), |goal| bare.with_goal(goal.to_vec()))
     };
     let training = fold.training.iter().map(bare).collect::<Result<Vec<_>>>()?;
@@ -206,7 +231,11 @@ fn refit(model: &Model, shown: &Shown, fold: &Fold) -> Result<Model> {
         canonical => canonical,
     };
     let rank = Truncation::Rank(model.n_styles().min(training.len()));
-    let options = FitOptions::new(canonical).n_styles(rank).alpha_z(model.attractor().alpha_z).threads(Threads::ONE);
+    let mut options =
+        FitOptions::new(canonical).n_styles(rank).alpha_z(model.attractor().alpha_z).threads(Threads::ONE);
+    if let Some(coordinates) = model.primitive().coordinates() {
+        options = options.dof_scale(DofScaling::Given(scale(model))).frame(coordinates.frame());
+    }
     let contexts = shown.contexts.map(|contexts| fold.training.iter().map(|&m| contexts[m].clone()).collect());
     let map = model.map().map_or(MapSelection::Auto, |map| MapSelection::Given(map.kind()));
     fit(&training, &FitOptions { contexts, map, ..options })
