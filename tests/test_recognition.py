@@ -150,6 +150,51 @@ def test_a_partner_that_is_not_seen_follows_from_the_other():
     assert np.abs(ahead.position - new.position[31:]).max() < 0.08
 
 
+def handover(lean, duration, order="wxyz"):
+    """Returns poses of a hand that turns by 1.5 rad on its way, and leans."""
+    turn = RISE * [1.5, lean, 0.3 * lean]
+    quaternions = pdmp.preprocessing.rotation_vectors_to_quaternions(turn, order=order)
+    place = np.hstack([0.5 * RISE, 0.2 * lean * RISE, 0.1 * (4 * S * (1 - S)) ** 3])
+    pose = np.hstack([place, quaternions])
+    return pdmp.Demonstration(pose, dt=duration / 60, rotations={3: order})
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_half_a_pose_gives_the_whole(order, tmp_path):
+    """Half of a pose gives the rest and the goal, in the columns of the demonstrations."""
+    rng = np.random.default_rng(3)
+    shapes = rng.uniform([-0.6, 0.8], [0.6, 1.2], (12, 2)).tolist()
+    demos = [handover(*shape, order) for shape in shapes]
+    model = pdmp.fit(demos)
+    path = tmp_path / "hand.safetensors"
+    model.save(path, prior=model.prior(demos))
+    recogniser = pdmp.load(path).recogniser(pdmp.Prior.load(path))
+    new = handover(0.37, 1.05, order)
+    for k in range(31):
+        pose = new.position[k].copy()
+        if k % 5 == 3:
+            pose[3 + k % 4] = np.nan  # the whole quaternion is missing
+        elif k % 5 == 1:
+            pose[3:] *= -1
+        recogniser.update(new.time[k], pose)
+    estimate, ahead = recogniser.estimate(), recogniser.continuation(new.time[31:])
+    assert estimate.goal.shape == (7,) and estimate.goal_deviation.shape == (6,)
+    assert ahead.position.shape == (30, 7) and ahead.deviation.shape == (30, 6)
+    np.testing.assert_allclose(np.linalg.norm(ahead.position[:, 3:], axis=1), 1, atol=1e-12)
+    for found, expected in ((estimate.goal, new.position[-1]), (ahead.position, new.position[31:])):
+        assert np.abs(found[..., :3] - expected[..., :3]).max() < 0.03
+        cosine = np.abs(np.sum(found[..., 3:] * expected[..., 3:], axis=-1))
+        assert 2 * np.arccos(np.minimum(cosine, 1)).max() < 0.15
+    whole = model.rollout(dt=0.01, conditions=estimate.conditions)
+    assert np.abs(whole.position[-1] - estimate.goal).max() < 0.01
+    controller = model.controller(dt=0.01, conditions=estimate.conditions)
+    controller.step()
+    with pytest.raises(ValueError, match="norm"):
+        recogniser.update(2.0, 0.5 * new.position[-1])
+    with pytest.raises(ValueError, match="position"):
+        recogniser.update(2.0, new.position[-1, :6])
+
+
 def test_a_context_says_where_a_movement_goes():
     """In a given context the movement is known before it begins; pickles and files keep that."""
     rng = np.random.default_rng(4)
@@ -177,6 +222,23 @@ def test_a_context_says_where_a_movement_goes():
     bare = pdmp.fit(demos)
     with pytest.raises(ValueError, match="context.*contexts"):
         bare.recogniser(bare.prior(demos), context=[0.3])
+
+
+def test_a_context_says_how_a_hand_will_lean():
+    """In a given context the orientation at the goal is known before the hand begins to turn."""
+    rng = np.random.default_rng(4)
+    leans = rng.uniform(-0.6, 0.6, 13)
+    *demos, new = [handover(lean, 1 + 0.2 * abs(lean)) for lean in leans.tolist()]
+    model = pdmp.fit(demos, contexts={"lean": leans[:12]})
+    prior = model.prior(demos)
+    errors = []
+    for context in (None, {"lean": leans[12]}):
+        recogniser = model.recogniser(prior, context=context)
+        for k in range(4):
+            recogniser.update(new.time[k], new.position[k])
+        cosine = abs(recogniser.estimate().goal[3:] @ new.position[-1, 3:])
+        errors.append(2 * np.arccos(min(1, cosine)))
+    assert errors[1] < 0.05 and errors[1] < 0.5 * errors[0]
 
 
 def test_a_prior_is_the_same_after_a_pickle(model, prior):

@@ -1915,8 +1915,7 @@ class Model:
         Raises
         ------
         ValueError
-            Other demonstrations than those of the fit, fewer than four, a single group, or a model with rotations or a time
-            warp.
+            Other demonstrations than those of the fit, fewer than four, a single group, or a model with a time warp.
         TypeError
             An argument has another type.
 
@@ -2826,7 +2825,7 @@ class Prior:
         """
     @property
     def parameters(self) -> _Array:  # (M, K)
-        """Parameters (M, K) of the demonstrations: style, goal and start, or style and anchor."""
+        """Parameters (M, K) of the demonstrations: style, goal and start, or style and anchor, in degrees of freedom."""
     @property
     def residual(self) -> _Array:  # (D,)
         """Standard deviations (D,) of the movements from those of the model."""
@@ -2846,7 +2845,8 @@ class Recogniser:
 
     At a given clock a movement is linear in style, goal and start, or anchor. Each of 64 hypotheses of the duration has the
     posterior of these under the mixture of the prior, in closed form, and is weighed by its likelihood. An observation
-    takes the same time and memory at any time.
+    takes the same time and memory at any time. A rotation counts as three degrees of freedom, the rotation vector about the
+    mean of the demonstrations at the clock of each hypothesis.
 
     The movement may pause: where it is slow against its prediction, the clock of all hypotheses rests until it goes on.
     """
@@ -2860,14 +2860,15 @@ class Recogniser:
         ----------
         time : float
             Time in s, after that of the observation before; intervals are arbitrary.
-        position : array_like, (D,)
-            Positions; NaN where one is missing.
+        position : array_like, (nq,)
+            Position in the columns of the demonstrations; NaN where one is missing. A quaternion with a NaN is missing; its
+            sign does not matter.
 
         Raises
         ------
         ValueError
-            The time is not after the one before, or the positions have another number or are infinite. The recogniser then
-            remains as it was.
+            The time is not after the one before, the positions have another number or are infinite, or the norm of a
+            quaternion is not 1. The recogniser then remains as it was.
         """
     def estimate(self) -> Estimate:
         """Returns the estimate from all observations so far.
@@ -2920,10 +2921,12 @@ class Estimate:
         """Standard deviations (J,) of the style."""
     @property
     def goal(self) -> _Array:  # (D,)
-        """Goal (D,), or the anchor of a rhythmic movement."""
+        """Goal (nq,), or the anchor of a rhythmic movement."""
     @property
     def goal_deviation(self) -> _Array:  # (D,)
-        """Standard deviations (D,) of the goal or anchor."""
+        """Standard deviations (D,) of the goal or anchor; those of a rotation are of the components of the rotation vector in rad
+        from it, in the frame of angular velocities.
+        """
     @property
     def duration(self) -> float:
         """Duration or period in s."""
@@ -2958,10 +2961,12 @@ class Continuation:
         """Times (T,) in s, on the clock of the observations."""
     @property
     def position(self) -> _Array:  # (T, D)
-        """Mean positions (T, D)."""
+        """Mean positions (T, nq), with unit quaternions of continuous signs."""
     @property
     def deviation(self) -> _Array:  # (T, D)
-        """Standard deviations (T, D): 90 % of held-out positions lie within 1.645 of them."""
+        """Standard deviations (T, D): 90 % of held-out positions lie within 1.645 of them. Those of a rotation are of the
+        components of the rotation vector in rad from the mean, in the frame of angular velocities, as in a prediction band.
+        """
 
 @final
 class ContextMap:

@@ -320,7 +320,8 @@ typedef struct {
     pdmp_conditions conditions;
     /// Standard deviations (n_styles) of the style.
     pdmp_vector style_deviation;
-    /// Standard deviations (n_dofs) of the goal or anchor.
+    /// Standard deviations (n_dofs) of the goal or anchor; those of a rotation are of the components of the rotation vector in
+    /// rad from it, in the frame of angular velocities.
     pdmp_vector goal_deviation;
     /// Duration or period, in seconds.
     double duration;
@@ -658,11 +659,11 @@ pdmp_status pdmp_controller_add_forcing(pdmp_controller *controller,
 /// pointer it is not known.
 ///
 /// `*recogniser` is set to the new recogniser, which the caller frees with pdmp_recogniser_free, or to NULL on error. The
-/// degrees of freedom are those of the model, which pdmp_model_load reads from the same file.
+/// coordinates and degrees of freedom are those of the model, which pdmp_model_load reads from the same file.
 ///
 /// Errors: PDMP_NULL; PDMP_IO; PDMP_FILE, also for a model file without a prior; PDMP_LENGTH; PDMP_ABSENT for a context if the model
 /// was fitted without contexts; PDMP_RANGE for a context as for pdmp_model_predict, or times that are not finite or in
-/// the wrong order, or a model with rotations or a time warp.
+/// the wrong order, or a model with a time warp.
 pdmp_status pdmp_recogniser_load(const char *path,
                                  pdmp_vector context,
                                  const pdmp_timing *timing,
@@ -683,11 +684,11 @@ pdmp_status pdmp_recogniser_from_bytes(const void *bytes,
 /// Frees a recogniser; NULL is ignored.
 void pdmp_recogniser_free(pdmp_recogniser *recogniser);
 
-/// Includes an observation: the positions (n_dofs) at a time in seconds, after that of the observation before. A degree of freedom
-/// that is not observed is NaN. Intervals are arbitrary.
+/// Includes an observation: the position (n_coordinates) at a time in seconds, after that of the observation before. A coordinate
+/// that is not observed is NaN; a quaternion with one is not observed, and its sign does not matter. Intervals are arbitrary.
 ///
-/// Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE if the time is not after the one before, or a position is infinite. The recogniser
-/// then remains as it was.
+/// Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE if the time is not after the one before, a position is infinite, or the norm of a
+/// quaternion is not 1. The recogniser then remains as it was.
 pdmp_status pdmp_recogniser_update(pdmp_recogniser *recogniser,
                                    double time,
                                    pdmp_vector position);
@@ -700,7 +701,8 @@ pdmp_status pdmp_recogniser_estimate(pdmp_recogniser *recogniser,
 
 /// Predicts the positions at times in seconds, from the last observation on.
 ///
-/// `position` and `deviation` take time.length rows of n_dofs numbers, one after the other: means and standard deviations.
+/// `position` takes time.length rows of n_coordinates numbers, one after the other, and `deviation` rows of n_dofs numbers: means
+/// and standard deviations.
 ///
 /// Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE if a time is before the last observation, and as for pdmp_recogniser_estimate.
 pdmp_status pdmp_recogniser_continuation(pdmp_recogniser *recogniser,

@@ -388,10 +388,11 @@ private:
     std::unique_ptr<pdmp_controller, Free> controller_;
 };
 
-/// Positions to come: n_dofs means and standard deviations for each time, one row after the other.
+/// Positions to come: n_coordinates means and n_dofs standard deviations for each time, one row after the other.
 struct Continuation {
     /// Allocates the vectors.
-    Continuation(std::size_t n_times, std::size_t n_dofs) : position(n_times * n_dofs), deviation(n_times * n_dofs) {}
+    Continuation(std::size_t n_times, std::size_t n_coordinates, std::size_t n_dofs)
+        : position(n_times * n_coordinates), deviation(n_times * n_dofs) {}
 
     std::vector<double> position, deviation;
 };
@@ -414,7 +415,7 @@ public:
         });
     }
 
-    /// Includes an observation, see pdmp_recogniser_update; a degree of freedom that is not observed is NaN.
+    /// Includes an observation, see pdmp_recogniser_update; a coordinate that is not observed is NaN.
     pdmp_status update(double time, pdmp_vector position) noexcept {
         return pdmp_recogniser_update(get(), time, position);
     }

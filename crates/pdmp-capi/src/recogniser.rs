@@ -20,6 +20,7 @@ use pdmp_status::PDMP_OK;
 pub struct pdmp_recogniser {
     inner: Recogniser,
     kind: Kind,
+    n_coordinates: usize,
     n_dofs: usize,
     /// Duration of a movement over its time constant.
     extent: f64,
@@ -51,7 +52,8 @@ pub struct pdmp_estimate {
     pub conditions: pdmp_conditions,
     /// Standard deviations (n_styles) of the style.
     pub style_deviation: pdmp_vector,
-    /// Standard deviations (n_dofs) of the goal or anchor.
+    /// Standard deviations (n_dofs) of the goal or anchor; those of a rotation are of the components of the rotation vector in
+    /// rad from it, in the frame of angular velocities.
     pub goal_deviation: pdmp_vector,
     /// Duration or period, in seconds.
     pub duration: f64,
@@ -101,8 +103,16 @@ unsafe fn create(
             duration: unsafe { timing.duration.as_ref() }.copied(),
         });
         let inner = Recogniser::new(&model, &prior, timing)?;
-        let (kind, n_dofs, extent) = (model.kind(), model.n_dofs(), model.duration() / model.tau());
-        let recogniser = pdmp_recogniser { inner, kind, n_dofs, extent, tau: model.tau(), phase: 0.0, fault: None };
+        let recogniser = pdmp_recogniser {
+            inner,
+            kind: model.kind(),
+            n_coordinates: model.n_coordinates(),
+            n_dofs: model.n_dofs(),
+            extent: model.duration() / model.tau(),
+            tau: model.tau(),
+            phase: 0.0,
+            fault: None,
+        };
         *handle = Box::into_raw(Box::new(recogniser));
         Ok(PDMP_OK)
     };
@@ -115,11 +125,11 @@ unsafe fn create(
 /// pointer it is not known.
 ///
 /// `*recogniser` is set to the new recogniser, which the caller frees with pdmp_recogniser_free, or to NULL on error. The
-/// degrees of freedom are those of the model, which pdmp_model_load reads from the same file.
+/// coordinates and degrees of freedom are those of the model, which pdmp_model_load reads from the same file.
 ///
 /// Errors: PDMP_NULL; PDMP_IO; PDMP_FILE, also for a model file without a prior; PDMP_LENGTH; PDMP_ABSENT for a context if the model
 /// was fitted without contexts; PDMP_RANGE for a context as for pdmp_model_predict, or times that are not finite or in
-/// the wrong order, or a model with rotations or a time warp.
+/// the wrong order, or a model with a time warp.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_recogniser_load(
     path: *const c_char,
@@ -179,11 +189,11 @@ fn call_on(
     status
 }
 
-/// Includes an observation: the positions (n_dofs) at a time in seconds, after that of the observation before. A degree of freedom
-/// that is not observed is NaN. Intervals are arbitrary.
+/// Includes an observation: the position (n_coordinates) at a time in seconds, after that of the observation before. A coordinate
+/// that is not observed is NaN; a quaternion with one is not observed, and its sign does not matter. Intervals are arbitrary.
 ///
-/// Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE if the time is not after the one before, or a position is infinite. The recogniser
-/// then remains as it was.
+/// Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE if the time is not after the one before, a position is infinite, or the norm of a
+/// quaternion is not 1. The recogniser then remains as it was.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_recogniser_update(
     recogniser: Option<&mut pdmp_recogniser>,
@@ -192,7 +202,7 @@ pub unsafe extern "C" fn pdmp_recogniser_update(
 ) -> pdmp_status {
     call_on(recogniser, |recogniser| {
         // SAFETY: the contract of the C ABI covers `position`.
-        let position = unsafe { position.require("position", recogniser.n_dofs, "DoF") }?;
+        let position = unsafe { position.require("position", recogniser.n_coordinates, "coordinate") }?;
         Ok(recogniser.inner.update(time, position)?)
     })
 }
@@ -207,7 +217,7 @@ pub extern "C" fn pdmp_recogniser_estimate(
 ) -> pdmp_status {
     call_on(recogniser, |recogniser| {
         let written = estimate.ok_or(Fault::Null("estimate"))?;
-        let pdmp_recogniser { inner, kind, n_dofs, extent, tau, phase, .. } = recogniser;
+        let pdmp_recogniser { inner, kind, extent, tau, phase, .. } = recogniser;
         let estimate = inner.estimate()?;
         *tau = estimate.duration / *extent;
         *phase = std::f64::consts::TAU * estimate.fraction;
@@ -219,7 +229,7 @@ pub extern "C" fn pdmp_recogniser_estimate(
         };
         let conditions = match kind {
             Kind::Discrete => {
-                let start = pdmp_vector::of(&estimate.parameters[estimate.n_styles + *n_dofs..]);
+                let start = pdmp_vector::of(estimate.start());
                 pdmp_conditions { goal, start, ..conditions }
             }
             Kind::Rhythmic => pdmp_conditions { anchor: goal, phase: ptr::from_ref(phase), ..conditions },
@@ -242,7 +252,8 @@ pub extern "C" fn pdmp_recogniser_estimate(
 
 /// Predicts the positions at times in seconds, from the last observation on.
 ///
-/// `position` and `deviation` take time.length rows of n_dofs numbers, one after the other: means and standard deviations.
+/// `position` takes time.length rows of n_coordinates numbers, one after the other, and `deviation` rows of n_dofs numbers: means
+/// and standard deviations.
 ///
 /// Errors: PDMP_NULL, PDMP_LENGTH; PDMP_RANGE if a time is before the last observation, and as for pdmp_recogniser_estimate.
 #[unsafe(no_mangle)]
@@ -255,10 +266,13 @@ pub unsafe extern "C" fn pdmp_recogniser_continuation(
     call_on(recogniser, |recogniser| {
         // SAFETY: the contract of the C ABI covers `time`.
         let time = unsafe { time.require("time", time.length, "time") }?;
-        let (n, per) = (time.len().saturating_mul(recogniser.n_dofs), "DoF of each time");
+        let [n_coordinates, n_dofs] =
+            [recogniser.n_coordinates, recogniser.n_dofs].map(|row| time.len().saturating_mul(row));
         // SAFETY: the contract of the C ABI covers the buffers, which overlap with no other argument.
-        let (position, deviation) =
-            unsafe { (position.require("position", n, per)?, deviation.require("deviation", n, per)?) };
+        let (position, deviation) = unsafe {
+            let position = position.require("position", n_coordinates, "coordinate of each time")?;
+            (position, deviation.require("deviation", n_dofs, "DoF of each time")?)
+        };
         Ok(recogniser.inner.write_continuation(time, position, deviation)?)
     })
 }

@@ -5,6 +5,11 @@
 mod common;
 #[path = "../../pdmp-core/tests/common/counting.rs"]
 mod counting;
+#[path = "../../pdmp-core/tests/common/poses.rs"]
+mod poses;
+mod random {
+    pub(crate) use super::counting::Random;
+}
 
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -213,11 +218,12 @@ fn matches_rust(kind: Kind, limits: &Limits, n_ticks: usize) {
     };
 }
 
-/// Observations of random parts at random times give the estimates of Rust to the bit, and allocate nothing.
+/// Observations of random parts at random times, of positions and of poses, give the estimates of Rust to the bit, and
+/// allocate nothing.
 #[test]
 fn recognition_matches_rust_to_the_bit_and_allocates_nothing() {
-    for kind in [Kind::Discrete, Kind::Rhythmic] {
-        let demos = if kind == Kind::Discrete { reaches() } else { cycles() };
+    let turning = poses::screws(5, 2.0, 0.4, 101, 1).into_iter().map(poses::pose).collect();
+    for (kind, demos) in [(Kind::Discrete, reaches()), (Kind::Rhythmic, cycles()), (Kind::Discrete, turning)] {
         let model = learn(&demos, &options(kind));
         let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
         let timing = Timing { starts: [-0.1, 0.2], duration: None };
@@ -233,11 +239,12 @@ fn recognition_matches_rust_to_the_bit_and_allocates_nothing() {
             assert_eq!(status, pdmp_status::PDMP_OK);
             Box::from_raw(made.assume_init())
         };
-        let n_dofs = model.n_dofs();
-        let (mut position, mut random, mut time) = (vec![0.0; n_dofs], Random(4), 3.0);
-        let zeros = || vec![0.0; 2 * n_dofs];
-        let (mut mean, mut deviation, mut written) = (zeros(), zeros(), [zeros(), zeros()]);
-        let buffers = written.each_mut().map(|numbers| pdmp_buffer { data: numbers.as_mut_ptr(), length: 2 * n_dofs });
+        let (n_coordinates, n_dofs) = (model.n_coordinates(), model.n_dofs());
+        let (mut position, mut random, mut time) = (vec![0.0; n_coordinates], Random(4), 3.0);
+        let zeros = || [vec![0.0; 2 * n_coordinates], vec![0.0; 2 * n_dofs]];
+        let ([mut mean, mut deviation], mut written) = (zeros(), zeros());
+        let buffers =
+            written.each_mut().map(|numbers| pdmp_buffer { data: numbers.as_mut_ptr(), length: numbers.len() });
         let (mut estimates, before) = (0, allocations());
         for k in 0..60 {
             time += random.scale(1e-3, 0.05);
@@ -246,6 +253,10 @@ fn recognition_matches_rust_to_the_bit_and_allocates_nothing() {
                 assert_eq!(pdmp_recogniser_reset(Some(&mut c)), pdmp_status::PDMP_OK);
             }
             position.iter_mut().for_each(|y| *y = if random.rarely() { f64::NAN } else { random.next() });
+            if n_coordinates > n_dofs {
+                let norm = position[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
+                position[3..].iter_mut().for_each(|x| *x /= norm);
+            }
             let mut estimate = MaybeUninit::uninit();
             let ahead = [time, time + 0.1];
             // SAFETY: the vectors and buffers are valid.
@@ -274,7 +285,7 @@ fn recognition_matches_rust_to_the_bit_and_allocates_nothing() {
             let discrete = kind == Kind::Discrete;
             assert!(same(conditions.style, expected.style()));
             assert!(same(if discrete { conditions.goal } else { conditions.anchor }, expected.goal()));
-            assert!(!discrete || same(conditions.start, &expected.parameters[n_styles + n_dofs..]));
+            assert!(!discrete || same(conditions.start, expected.start()));
             assert!(same(found.style_deviation, &expected.deviations[..n_styles]));
             assert!(same(found.goal_deviation, expected.goal_deviation()));
             assert_eq!(conditions.phase.is_null(), discrete);

@@ -160,7 +160,7 @@ int main(int, char **argv) try {
     pdmp_estimate estimate{};
     REQUIRE(recogniser.estimate(estimate) == PDMP_OK && estimate.fraction > 0.3 && estimate.goal_deviation.length == 3);
     const std::array<double, 2> times{0.7, 0.8};
-    pdmp::Continuation ahead_of(2, 3);
+    pdmp::Continuation ahead_of(2, 3, 3);
     REQUIRE(recogniser.continuation(pdmp::view(times), ahead_of) == PDMP_OK && ahead_of.deviation[5] > 0.0);
     REQUIRE(recogniser.reset() == PDMP_OK && watch(recogniser).goal == seen.goal);
     auto other = pdmp::Recogniser::load(argv[1]);

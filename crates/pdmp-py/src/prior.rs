@@ -105,7 +105,7 @@ impl Prior {
         py.detach(|| pdmp_core::inference::Prior::from_bytes(data)).map(Self).map_err(raise)
     }
 
-    /// Parameters (M, K) of the demonstrations: style, goal and start, or style and anchor.
+    /// Parameters (M, K) of the demonstrations: style, goal and start, or style and anchor, in degrees of freedom.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> Matrix<'py> {
         locked(numpy::PyArray2::from_owned_array(py, self.0.parameters().to_owned()))
@@ -193,8 +193,7 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     Other demonstrations than those of the fit, fewer than four, a single group, or a model with rotations or a time
-    ///     warp.
+    ///     Other demonstrations than those of the fit, fewer than four, a single group, or a model with a time warp.
     /// TypeError
     ///     An argument has another type.
     ///

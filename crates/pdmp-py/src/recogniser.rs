@@ -25,9 +25,10 @@ pub(crate) struct Estimate {
     style: Py<PyArray1<f64>>,
     /// Standard deviations (J,) of the style.
     style_deviation: Py<PyArray1<f64>>,
-    /// Goal (D,), or the anchor of a rhythmic movement.
+    /// Goal (nq,), or the anchor of a rhythmic movement.
     goal: Py<PyArray1<f64>>,
-    /// Standard deviations (D,) of the goal or anchor.
+    /// Standard deviations (D,) of the goal or anchor; those of a rotation are of the components of the rotation vector in rad
+    /// from it, in the frame of angular velocities.
     goal_deviation: Py<PyArray1<f64>>,
     /// Duration or period in s.
     duration: f64,
@@ -80,9 +81,10 @@ impl Estimate {
 pub(crate) struct Continuation {
     /// Times (T,) in s, on the clock of the observations.
     time: Py<PyArray1<f64>>,
-    /// Mean positions (T, D).
+    /// Mean positions (T, nq), with unit quaternions of continuous signs.
     position: Py<PyArray2<f64>>,
-    /// Standard deviations (T, D): 90 % of held-out positions lie within 1.645 of them.
+    /// Standard deviations (T, D): 90 % of held-out positions lie within 1.645 of them. Those of a rotation are of the
+    /// components of the rotation vector in rad from the mean, in the frame of angular velocities, as in a prediction band.
     deviation: Py<PyArray2<f64>>,
 }
 
@@ -98,7 +100,8 @@ impl Continuation {
 ///
 /// At a given clock a movement is linear in style, goal and start, or anchor. Each of 64 hypotheses of the duration has the
 /// posterior of these under the mixture of the prior, in closed form, and is weighed by its likelihood. An observation
-/// takes the same time and memory at any time.
+/// takes the same time and memory at any time. A rotation counts as three degrees of freedom, the rotation vector about the
+/// mean of the demonstrations at the clock of each hypothesis.
 ///
 /// The movement may pause: where it is slow against its prediction, the clock of all hypotheses rests until it goes on.
 #[pyclass(module = "pdmp")]
@@ -116,14 +119,15 @@ impl Recogniser {
     /// ----------
     /// time : float
     ///     Time in s, after that of the observation before; intervals are arbitrary.
-    /// position : array_like, (D,)
-    ///     Positions; NaN where one is missing.
+    /// position : array_like, (nq,)
+    ///     Position in the columns of the demonstrations; NaN where one is missing. A quaternion with a NaN is missing; its
+    ///     sign does not matter.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     The time is not after the one before, or the positions have another number or are infinite. The recogniser then
-    ///     remains as it was.
+    ///     The time is not after the one before, the positions have another number or are infinite, or the norm of a
+    ///     quaternion is not 1. The recogniser then remains as it was.
     fn update(&mut self, time: Scalar<'_>, position: &Bound<'_, PyAny>) -> PyResult<()> {
         refill("position", position, &mut self.position)?;
         self.inner.update(time.number("time")?, &self.position).map_err(raise)
