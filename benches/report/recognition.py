@@ -16,7 +16,7 @@ import pdmp
 from pdmp import Demonstration
 from pdmp._markdown import markdown_table
 from recordings import ARM, HAND, is_available, recorded, rows
-from report import partners, pauses, walks
+from report import partners, pauses, poses, walks
 from report.observed import MAX_FOLDS, SHARES, Simple, sampled, shown
 from report.sets import cut, numbers
 
@@ -308,7 +308,7 @@ def main() -> None:
     if not sections:
         raise SystemExit("no recordings: set PDMP_DATA to a folder with sets of them")
     sections = [INTRODUCTION, times(), summary(of_splits), *sections]
-    sections += [walks.section(options.most), partners.section()]
+    sections += [walks.section(options.most), partners.section(), poses.section(options.most)]
     print("\n".join(sections[1:3]), flush=True)
     if options.write:
         (ROOT / "docs" / "recognition.md").write_text("\n".join(sections), encoding="utf-8")
