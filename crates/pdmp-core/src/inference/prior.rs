@@ -147,6 +147,22 @@ impl Prior {
     /// Returns the prior with the deviations of the demonstrations from the predictions for their contexts, with settings
     /// and factors of recognition in a given context.
     ///
+    /// ```
+    /// # use ndarray::array;
+    /// # use pdmp_core::Kind;
+    /// # use pdmp_core::inference::{Calibration, Mixture, Prior, Settings};
+    /// # let settings = Settings { bandwidth: 0.5, tempering: 1.0, correlation_time: 0.1 };
+    /// # let parameters = array![[0.1, 1.0, 0.0], [0.2, 1.1, 0.0], [0.4, 1.3, 0.1]];
+    /// # let (log_durations, calibration) = (vec![0.0, 0.1, 0.2], Calibration::NONE);
+    /// # let mixture = Mixture { parameters, log_durations, settings, calibration };
+    /// # let prior = Prior::new(Kind::Discrete, mixture.clone(), vec![0.01])?;
+    /// let parameters = array![[-0.01, 0.02, 0.0], [0.02, -0.01, 0.0], [-0.01, -0.01, 0.0]];
+    /// let deviations = Mixture { parameters, log_durations: vec![0.02, -0.04, 0.02], ..mixture };
+    /// let prior = prior.with_deviations(deviations)?;
+    /// assert!(prior.deviations().is_some());
+    /// # Ok::<(), pdmp_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// A shape other than that of the demonstrations, and as for [`Prior::new`].
     pub fn with_deviations(self, deviations: Mixture) -> Result<Self> {

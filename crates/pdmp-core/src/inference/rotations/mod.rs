@@ -55,7 +55,7 @@ impl Sample {
         Self { dofs: vec![f64::NAN; layout.n_dofs], rotations: vec![[f64::NAN; 4]; layout.rotations().len()] }
     }
 
-    /// Returns to another sample of the same layout.
+    /// Copies another sample of the same layout.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.dofs.copy_from_slice(&other.dofs);
         self.rotations.copy_from_slice(&other.rotations);
