@@ -7,7 +7,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::constraints::{Request, share_at};
 use super::linear_path::LinearPath;
-use super::passage::{CELLS, Passed, Prior};
+use super::passage::{Passed, Prior};
+use super::residual::{CELLS, Residual};
 use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
@@ -16,7 +17,6 @@ use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::model::{Model, Prediction};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
-use crate::numerics::matern::Matern52;
 use crate::validate::check_range;
 
 /// Default standard deviation of what the styles leave of a movement, relative to the range. Geometric mean over eight sets of
@@ -162,27 +162,28 @@ pub fn through(
     let smallest = MIN_RANGE_RATIO * largest_range(inside.ranges());
     let scales: Vec<f64> = inside.ranges().iter().map(|range| range.max(smallest)).collect();
     let discrete = inside.kind() == Kind::Discrete;
+    let from = options.from_phase.map(|phase| share_at(canonical, "from_phase", phase)).transpose()?;
+    let late = Error::Argument { name: "from_phase", problem: "is the end of the movement: choose an earlier one" };
     let prior = Prior {
         path: &path,
         covariance: covariance(model, &path, conditions, options),
-        kernel: if discrete { Matern52::on_line(LENGTH) } else { Matern52::on_circle(LENGTH) },
+        residual: Residual::new(canonical, LENGTH, from).ok_or(late)?,
         variances: scales.iter().map(|scale| (scale * deviation.max(MIN_DEVIATION)).powi(2)).collect(),
-        canonical,
+        extent: canonical.extent(),
+        carries: from.is_some(),
     };
-    let from = options.from_phase.map(|phase| share_at(canonical, "from_phase", phase)).transpose()?;
     let parameters = [&resolved.style, &resolved.centre].into_iter().chain(resolved.start.iter().filter(|_| discrete));
     let parameters: Vec<f64> = parameters.flatten().copied().collect();
     let request =
         Request { primitive, conditions: &resolved, prior: &prior, scales: &scales, time: &time, from, parameters };
-    let mut constraints = request.constraints(points)?;
+    let constraints = request.constraints(points)?;
     let n_constraints = constraints.rows.len();
     if n_constraints == 0 {
         return Err(Error::Argument { name: "points", problem: "are empty: pass at least one" });
     }
     let allowed = "must be at most 500: pass fewer points";
     check_range("number of constraints", n_constraints as f64, n_constraints <= MAX_CONSTRAINTS, allowed)?;
-    request.add_ends(&mut constraints);
-    let passed = prior.pass(&constraints, from.unwrap_or(0.0), from.is_some());
+    let passed = prior.pass(&constraints);
     let passed = passed.filter(|passed| passed.error <= MAX_ERROR && passed.distance.is_finite());
     let Some(Passed { change, forcing, distance, .. }) = passed else {
         let problem = "contradict each other or the conditions: no movement passes all of them; give them a tolerance, or \
