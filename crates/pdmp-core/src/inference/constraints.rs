@@ -182,12 +182,10 @@ impl Request<'_> {
 
     /// Returns a derivative of the movement under the conditions.
     fn jet_at(&self, functional: Functional) -> Jet {
-        let (path, n_dofs, extent) = (self.prior.path, self.scales.len(), self.canonical().extent());
+        let (path, extent) = (self.prior.path, self.canonical().extent());
         let Functional { place, order } = functional;
         let (rows, mut mean) = path.rows(&Samples::at(place, order));
-        for (i, a) in rows.iter().enumerate() {
-            mean[i % n_dofs] += a * self.parameters[path.parameter(i / n_dofs, i % n_dofs)];
-        }
+        path.products(&rows, &self.parameters, &mut mean);
         if let Some(forcing) = &self.conditions.forcing {
             let displacement = &forcing.displacement(place * extent)[order];
             mean.iter_mut().zip(displacement).for_each(|(mean, x)| *mean += x * extent.powi(order as i32));

@@ -7,8 +7,6 @@
 
 use std::sync::Arc;
 
-use ndarray::Array2;
-
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::conditions::ResolvedConditions;
@@ -55,14 +53,15 @@ pub(super) fn hermite(t: f64, order: usize, per_unit: f64) -> [f64; 6] {
         1 => [per_unit, 1.0, per_unit.recip()],
         _ => [per_unit * per_unit, per_unit, 1.0],
     };
-    std::array::from_fn(|i| {
-        let [a, b, c, d, e, f] = HERMITE[order][i];
-        (a + t * (b + t * (c + t * (d + t * (e + t * f))))) * scales[i % 3]
-    })
+    let mut weights = [0.0; 6];
+    for (i, [a, b, c, d, e, f]) in HERMITE[order].iter().enumerate() {
+        weights[i] = (a + t * (b + t * (c + t * (d + t * (e + t * f))))) * scales[i % 3];
+    }
+    weights
 }
 
 /// Movement under given conditions as a function of its parameters.
-pub(super) struct LinearPath {
+pub(super) struct LinearPath<'a> {
     kind: Kind,
     n_styles: usize,
     n_dofs: usize,
@@ -70,9 +69,11 @@ pub(super) struct LinearPath {
     /// Slopes dy/dv at start and end where the conditions give them.
     start_slope: Option<Vec<f64>>,
     end_slope: Option<Vec<f64>>,
-    responses: Arc<Responses>,
-    /// Duration of the responses, in seconds.
-    duration: f64,
+    /// Responses (T, D) by order of the derivative with respect to v: those to the styles, to the start, to the velocity and, if
+    /// one is in force, to the final velocity.
+    curves: [Vec<&'a [f64]>; 3],
+    /// Duration of the responses, in seconds, by powers from 0 to 2.
+    scales: [f64; 3],
 }
 
 /// Derivative of a movement as a sum of samples of its curve and two derivatives of that, in units of the share v.
@@ -120,26 +121,36 @@ fn interval(v: f64) -> (usize, f64) {
     (interval, position - interval as f64)
 }
 
-impl LinearPath {
+/// Returns the responses of a primitive of degrees of freedom on which movements with or without a final velocity depend.
+pub(super) fn path_responses(primitive: &Arc<Primitive>, has_goal_velocity: bool) -> Result<Arc<Responses>> {
+    let grid = TimeGrid { dt: primitive.duration() / INTERVALS as f64, duration: None };
+    responses(primitive, primitive.tau, has_goal_velocity, grid, &mut |_| Ok(()))
+}
+
+impl<'a> LinearPath<'a> {
     /// Returns the movement of a primitive of degrees of freedom; the slopes are those of its conditions per unit of v.
     pub(super) fn new(
-        primitive: &Arc<Primitive>,
+        primitive: &Primitive,
         conditions: &ResolvedConditions,
-        start_slope: Option<Vec<f64>>,
-        end_slope: Option<Vec<f64>>,
-    ) -> Result<Self> {
-        let (kind, duration) = (primitive.kind(), primitive.duration());
-        let grid = TimeGrid { dt: duration / INTERVALS as f64, duration: None };
-        Ok(Self {
-            kind,
+        [start_slope, end_slope]: [Option<Vec<f64>>; 2],
+        responses: &'a Responses,
+    ) -> Self {
+        let duration = primitive.duration();
+        let curves = responses.0.each_ref().map(|curves| {
+            let Curves { styles, start, velocity, goal_velocity } = curves;
+            let all = styles.iter().chain([start, velocity]).chain(goal_velocity);
+            all.map(|curve| curve.as_slice().unwrap_or_default()).collect()
+        });
+        Self {
+            kind: primitive.kind(),
             n_styles: primitive.n_styles(),
             n_dofs: primitive.n_dofs(),
             amplitude: conditions.amplitude,
-            responses: responses(primitive, primitive.tau, end_slope.is_some(), grid, &mut |_| Ok(()))?,
             start_slope,
             end_slope,
-            duration,
-        })
+            curves,
+            scales: [1.0, duration, duration * duration],
+        }
     }
 
     /// Returns the number of parameters.
@@ -157,77 +168,96 @@ impl LinearPath {
         if index < self.n_styles { index } else { self.n_styles + (index - self.n_styles) * self.n_dofs + dof }
     }
 
-    /// Returns the coefficients a (width, D) of all DoFs in a derivative, and c (D,).
-    pub(super) fn rows(&self, Samples { order, terms }: &Samples) -> (Vec<f64>, Vec<f64>) {
-        let n = self.n_dofs;
-        let scales = [1.0, self.duration, self.duration * self.duration];
-        let sum = |curve: &dyn Fn(&Curves) -> Option<&Array2<f64>>, factor: f64, to: &mut [f64]| {
-            for &(sample, order, weight) in terms {
-                let weight = weight * scales[order] * factor;
-                let samples = curve(&self.responses.0[order]).map(|curve| curve.row(sample));
-                to.iter_mut().zip(samples.into_iter().flatten()).for_each(|(to, x)| *to += weight * x);
+    /// Returns the scalar product of the coefficients (width,) of a DoF with parameters (P,).
+    pub(super) fn product(&self, row: &[f64], dof: usize, parameters: &[f64]) -> f64 {
+        let (styles, rest) = row.split_at(self.n_styles);
+        let sum: f64 = styles.iter().zip(parameters).map(|(a, x)| a * x).sum();
+        let own = rest.iter().enumerate();
+        own.fold(sum, |sum, (k, a)| sum + a * parameters[self.n_styles + k * self.n_dofs + dof])
+    }
+
+    /// Returns the scalar products of coefficients (width, D) of all DoFs with parameters (P,).
+    pub(super) fn products(&self, rows: &[f64], parameters: &[f64], products: &mut [f64]) {
+        for (c, row) in rows.chunks(self.n_dofs).enumerate() {
+            for (dof, (product, a)) in products.iter_mut().zip(row).enumerate() {
+                *product += a * parameters[self.parameter(c, dof)];
             }
-        };
+        }
+    }
+
+    /// Adds a curve, multiplied by a number.
+    fn add(&self, curve: usize, Samples { terms, .. }: &Samples, factor: f64, to: &mut [f64]) {
+        for &(sample, order, weight) in terms {
+            let weight = weight * self.scales[order] * factor;
+            let row = self.row(curve, order, sample);
+            to.iter_mut().zip(row).for_each(|(to, x)| *to += weight * x);
+        }
+    }
+
+    /// Returns a sample (D,) of a curve, which is empty if there is no such curve.
+    fn row(&self, curve: usize, order: usize, sample: usize) -> &[f64] {
+        let curve = self.curves[order].get(curve).and_then(|curve| curve.get(sample * self.n_dofs..));
+        curve.map_or(&[], |rest| &rest[..self.n_dofs.min(rest.len())])
+    }
+
+    /// Returns the coefficients a (width, D) of all DoFs in a derivative, and c (D,).
+    pub(super) fn rows(&self, samples: &Samples) -> (Vec<f64>, Vec<f64>) {
+        let n = self.n_dofs;
         let (mut rows, mut rest) = (vec![0.0; n * self.width()], vec![0.0; n]);
         for (j, row) in rows.chunks_mut(n).take(self.n_styles).enumerate() {
-            sum(&|curves| curves.styles.get(j), self.amplitude, row);
+            self.add(j, samples, self.amplitude, row);
         }
-        let constant = if *order == 0 { 1.0 } else { 0.0 };
+        let constant = if samples.order == 0 { 1.0 } else { 0.0 };
         let (styles, centres) = rows.split_at_mut(n * self.n_styles);
         let (centres, starts) = centres.split_at_mut(n);
         if self.kind == Kind::Rhythmic {
             centres.fill(constant);
             return (rows, rest);
         }
-        sum(&|curves| Some(&curves.start), 1.0, starts);
+        self.add(self.n_styles, samples, 1.0, starts);
         centres.iter_mut().zip(starts).for_each(|(centre, start)| *centre = constant - *start);
-        if let Some(slope) = &self.start_slope {
+        let mut end = |slope: &[f64], curve: usize| {
             let mut response = vec![0.0; n];
-            sum(&|curves| Some(&curves.velocity), 1.0 / self.duration, &mut response);
-            for (j, row) in styles.chunks_mut(n).enumerate() {
-                let slopes = self.responses.0[1].styles[j].row(0);
-                let changed = row.iter_mut().zip(slopes).zip(&response);
-                changed.for_each(|((x, slope), response)| *x -= slope * self.duration * response);
-            }
+            self.add(curve, samples, 1.0 / self.scales[1], &mut response);
             rest.iter_mut().zip(slope.iter().zip(&response)).for_each(|(rest, (slope, x))| *rest += slope * x);
+            response
+        };
+        if let Some(slope) = &self.start_slope {
+            let response = end(slope, self.n_styles + 1);
+            for (j, row) in styles.chunks_mut(n).enumerate() {
+                let changed = row.iter_mut().zip(self.row(j, 1, 0)).zip(&response);
+                changed.for_each(|((x, slope), response)| *x -= slope * self.scales[1] * response);
+            }
         }
         if let Some(slope) = &self.end_slope {
-            let mut response = vec![0.0; n];
-            sum(&|curves| curves.goal_velocity.as_ref(), 1.0 / self.duration, &mut response);
-            rest.iter_mut().zip(slope.iter().zip(&response)).for_each(|(rest, (slope, x))| *rest += slope * x);
+            end(slope, self.n_styles + 2);
         }
         (rows, rest)
     }
 
     /// Returns the change aᵀΔθ of a movement.
     pub(super) fn change(&self, change: &[f64]) -> Change<'_> {
-        let (n, discrete) = (self.n_dofs, self.kind == Kind::Discrete);
+        let n = self.n_dofs;
         let (styles, positions) = change.split_at(self.n_styles);
         let (centre, start) = positions.split_at(n);
         let mut weights: Vec<F64x4> = styles.iter().flat_map(|x| pack(&vec![self.amplitude * x; n])).collect();
-        if discrete {
+        if self.kind == Kind::Discrete {
             weights.extend(pack(&centre.iter().zip(start).map(|(centre, start)| start - centre).collect::<Vec<_>>()));
         }
         if self.start_slope.is_some() {
-            let slope = |dof| -styles.iter().zip(&self.responses.0[1].styles).map(|(x, r)| x * r[[0, dof]]).sum::<f64>();
-            weights.extend(pack(&(0..n).map(slope).collect::<Vec<_>>()));
+            let mut slope = vec![0.0; n];
+            for (j, x) in styles.iter().enumerate() {
+                slope.iter_mut().zip(self.row(j, 1, 0)).for_each(|(slope, response)| *slope -= x * response);
+            }
+            weights.extend(pack(&slope));
         }
-        let curves = self.responses.0.each_ref().map(|curves| {
-            let start = discrete.then_some(&curves.start);
-            let velocity = self.start_slope.as_ref().map(|_| &curves.velocity);
-            let all = curves.styles.iter().chain(start).chain(velocity);
-            all.map(|curve| curve.as_slice().unwrap_or_default()).collect()
-        });
-        Change { n_dofs: n, duration: self.duration, curves, weights, constant: pack(centre) }
+        Change { path: self, weights, constant: pack(centre) }
     }
 }
 
 /// Change of a movement, as a sum of curves (T, D) with a weight for each DoF.
 pub(super) struct Change<'a> {
-    n_dofs: usize,
-    duration: f64,
-    /// Curves by order of the derivative.
-    curves: [Vec<&'a [f64]>; 3],
+    path: &'a LinearPath<'a>,
     /// Weights by curve and group.
     weights: Vec<F64x4>,
     constant: Vec<F64x4>,
@@ -237,24 +267,25 @@ impl Change<'_> {
     /// Adds the change and its two derivatives at `v` in [0, 1] to those of all groups.
     #[inline(always)]
     pub(super) fn add_to<T: Register>(&self, v: f64, jets: &mut [[F64x4; 3]]) {
-        let (interval, t) = interval(v);
+        let LinearPath { n_dofs, curves, scales, .. } = self.path;
+        let (n_groups, (interval, t)) = (jets.len(), interval(v));
+        let n_curves = self.weights.len() / n_groups;
         let mut weights = [[0.0; 6]; 3];
         for order in 0..3 {
             weights[order] = hermite(t, order, INTERVALS as f64);
             for i in 0..6 {
-                weights[order][i] *= [1.0, self.duration, self.duration * self.duration][i % 3];
+                weights[order][i] *= scales[i % 3];
             }
         }
-        let n_groups = jets.len();
         for group in 0..n_groups {
             let jet = &mut jets[group];
             let mut sums = [T::load(&jet[0]) + T::load(&self.constant[group]), T::load(&jet[1]), T::load(&jet[2])];
             for i in 0..6 {
-                let place = (interval + i / 3) * self.n_dofs + group * WIDTH;
-                let mut sample = T::default();
-                for (curve, samples) in self.curves[i % 3].iter().enumerate() {
+                let place = (interval + i / 3) * n_dofs + group * WIDTH;
+                let (mut sample, curves) = (T::default(), &curves[i % 3]);
+                for curve in 0..n_curves {
                     let weight = T::load(&self.weights[curve * n_groups + group]);
-                    sample = sample + weight * load::<T>(samples, place);
+                    sample = sample + weight * load::<T>(curves[curve], place);
                 }
                 for order in 0..3 {
                     sums[order] = sums[order] + sample * weights[order][i];
@@ -268,9 +299,11 @@ impl Change<'_> {
 /// Loads four numbers, those past the end as zeros.
 #[inline(always)]
 fn load<T: Register>(numbers: &[f64], place: usize) -> T {
-    let rest = numbers.get(place..).unwrap_or_default();
-    match rest.first_chunk() {
+    if place >= numbers.len() {
+        return T::default();
+    }
+    match numbers[place..].first_chunk() {
         Some(four) => T::load_numbers(four),
-        None => T::load(&padded(rest)),
+        None => T::load(&padded(&numbers[place..])),
     }
 }

@@ -33,10 +33,12 @@ const ACCURACY: f64 = 1e-11;
 const WEIGHT_ACCURACY: f64 = 1e-13;
 /// Maximum number of refinements. Each removes the error that rounding and interpolation leave.
 const MAX_REFINEMENTS: usize = 20;
+/// Variance of a parameter given the others, relative to its own, below which it is rounding.
+const MIN_PIVOT: f64 = 1e-12;
 
 /// Distribution of movements.
 pub(super) struct Prior<'a> {
-    pub(super) path: &'a LinearPath,
+    pub(super) path: &'a LinearPath<'a>,
     pub(super) covariance: DMatrix<f64>,
     pub(super) residual: Residual,
     /// σ² (D,).
@@ -114,15 +116,18 @@ impl Prior<'_> {
         // Large weights of opposite sign leave a rounding error in ΣAᵀλ, but not in the sum of its corrections.
         let mut change = DVector::zeros(self.covariance.nrows());
         for refinement in 0.. {
+            let mut last = f64::INFINITY;
             for _ in 0..MAX_REFINEMENTS {
                 system.factor.solve(&mut errors);
                 weights += errors.column(0);
                 change.gemv(1.0, &system.spread, &errors.column(0), 1.0);
                 distance.get_or_insert_with(|| residuals.dot(&errors).max(0.0).sqrt());
                 system.expected_errors(&weights, &change, &mut errors);
-                if !(system.largest(&errors) > WEIGHT_ACCURACY) {
+                let error = system.largest(&errors);
+                if !(error > WEIGHT_ACCURACY && error < 0.5 * last) {
                     break;
                 }
+                last = error;
             }
             let forcing = system.displacement(&weights, &change);
             system.errors(&forcing, &weights, &change, &mut errors);
@@ -161,18 +166,17 @@ impl Prior<'_> {
         };
         let rows = compact(&exact);
         let mut spread = DMatrix::zeros(covariance.nrows(), n);
-        for (i, (row, mut column)) in constraints.rows.iter().zip(spread.column_iter_mut()).enumerate() {
-            for (c, x) in rows.column(i).iter().enumerate() {
-                column.axpy(*x, &covariance.column(path.parameter(c, row.dof)), 1.0);
+        for (i, (row, mut to)) in constraints.rows.iter().zip(spread.column_iter_mut()).enumerate() {
+            for (c, a) in column(&rows, i).iter().enumerate() {
+                to.iter_mut().zip(column(&covariance, path.parameter(c, row.dof))).for_each(|(to, x)| *to += a * x);
             }
         }
         let mut matrix = DMatrix::zeros(n, n);
         for (i, a) in constraints.rows.iter().enumerate() {
             matrix[(i, i)] = a.tolerance * a.tolerance;
             for (j, b) in constraints.rows.iter().enumerate().skip(i) {
-                let terms = (0..width).map(|c| rows[(c, j)] * spread[(path.parameter(c, b.dof), i)]);
                 let own = if a.dof == b.dof { self.variances[a.dof] * bridge.covariance[(a.jet, b.jet)] } else { 0.0 };
-                matrix[(j, i)] += own + terms.sum::<f64>();
+                matrix[(j, i)] += own + path.product(column(&rows, j), b.dof, column(&spread, i));
             }
         }
         let factor = Factor::new(matrix)?;
@@ -188,23 +192,22 @@ impl Prior<'_> {
     /// Returns the covariance of the parameters given that the movement vanishes at the ends, with a(E) of each.
     fn given_ends(&self, ends: &[Vec<f64>]) -> Option<DMatrix<f64>> {
         let (n, n_dofs, width) = (self.covariance.nrows(), self.variances.len(), self.path.width());
-        let mut precision = DMatrix::zeros(n, n);
-        let root = semidefinite_root(&self.covariance);
+        let mut precision = DMatrix::<f64>::zeros(n, n);
+        let mut root = semidefinite_root(&self.covariance);
         for dof in 0..n_dofs {
             let mut own = DMatrix::from_fn(ends.len(), width, |e, c| ends[e][c * n_dofs + dof]);
             self.residual.factor().whiten(&mut own);
-            let square = own.tr_mul(&own) / self.variances[dof];
+            let square = own.transpose() * own / self.variances[dof];
             for i in 0..width {
                 for j in 0..width {
                     precision[(self.path.parameter(i, dof), self.path.parameter(j, dof))] += square[(i, j)];
                 }
             }
         }
-        let mut own = root.tr_mul(&(precision * &root));
+        let mut own: DMatrix<f64> = &root * (precision * root.transpose());
         (0..n).for_each(|i| own[(i, i)] += 1.0);
-        let mut root = root.transpose();
         Factor::new(own)?.whiten(&mut root);
-        Some(root.tr_mul(&root))
+        Some(root.transpose() * root)
     }
 }
 
@@ -218,8 +221,7 @@ impl System<'_> {
     /// Returns aᵀΔθ of a constraint.
     fn moved(&self, index: usize, change: &DVector<f64>) -> f64 {
         let dof = self.constraints.rows[index].dof;
-        let row = self.rows.column(index);
-        row.iter().enumerate().map(|(c, x)| x * change[self.prior.path.parameter(c, dof)]).sum()
+        self.prior.path.product(column(&self.rows, index), dof, change.as_slice())
     }
 
     /// Computes the errors that weights of a table leave.
@@ -249,8 +251,7 @@ impl System<'_> {
         for (i, row) in self.constraints.rows.iter().enumerate() {
             let own = if self.prior.carries { 0.0 } else { self.moved(i, change) };
             let (values, scale) = &values[row.jet];
-            errors[i] =
-                row.residual - own - values[row.dof] * scale - row.tolerance * row.tolerance * weights[i];
+            errors[i] = row.residual - own - values[row.dof] * scale - row.tolerance * row.tolerance * weights[i];
         }
     }
 
@@ -265,12 +266,11 @@ impl System<'_> {
         let mut end_weights = -(&self.bridge.gains * &own);
         if self.prior.carries {
             // a(E)ᵀΔθ.
-            let mut ends = DMatrix::zeros(self.ends.len(), n_dofs);
-            for (e, rows) in self.ends.iter().enumerate() {
-                for (i, x) in rows.iter().enumerate() {
-                    ends[(e, i % n_dofs)] += x * change[path.parameter(i / n_dofs, i % n_dofs)];
-                }
+            let mut ends = DMatrix::zeros(n_dofs, self.ends.len());
+            for (rows, mut to) in self.ends.iter().zip(ends.column_iter_mut()) {
+                path.products(rows, change.as_slice(), to.as_mut_slice());
             }
+            let mut ends = ends.transpose();
             residual.factor().solve(&mut ends);
             end_weights -= ends;
         }
@@ -282,17 +282,26 @@ impl System<'_> {
     }
 }
 
-/// Returns L with LLᵀ for a positive semidefinite matrix; columns of dependent rows are zero.
+/// Returns a column of a matrix.
+fn column(matrix: &DMatrix<f64>, index: usize) -> &[f64] {
+    let n = matrix.nrows();
+    &matrix.as_slice()[index * n..(index + 1) * n]
+}
+
+/// Returns U with UᵀU for a positive semidefinite matrix; rows of dependent columns are zero.
 fn semidefinite_root(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     let mut root = DMatrix::zeros(n, n);
     for j in 0..n {
-        let product = |root: &DMatrix<f64>, i: usize| (0..j).map(|k| root[(i, k)] * root[(j, k)]).sum::<f64>();
-        let pivot = matrix[(j, j)] - product(&root, j);
-        if pivot > 1e-12 * matrix[(j, j)] {
+        let rest = |root: &DMatrix<f64>, i: usize| {
+            let (own, other) = (&column(root, i)[..j], &column(root, j)[..j]);
+            matrix[(i, j)] - own.iter().zip(other).map(|(a, b)| a * b).sum::<f64>()
+        };
+        let pivot = rest(&root, j);
+        if pivot > MIN_PIVOT * matrix[(j, j)] {
             let inverse = pivot.sqrt().recip();
             for i in j..n {
-                root[(i, j)] = (matrix[(i, j)] - product(&root, i)) * inverse;
+                root[(j, i)] = rest(&root, i) * inverse;
             }
         }
     }

@@ -147,9 +147,8 @@ impl Residual {
         let position = since * per_unit;
         let cell = (position as usize).min(CELLS - 1);
         let [a, b, c, d, e, f] = hermite(position - cell as f64, functional.order, per_unit);
-        [(cell, [a, b, c]), (cell + 1, [d, e, f])].map(|(knot, weights)| {
-            (self.knot(knot), if self.is_end(knot) { [0.0; 3] } else { weights })
-        })
+        [(cell, [a, b, c]), (cell + 1, [d, e, f])]
+            .map(|(knot, weights)| (self.knot(knot), if self.is_end(knot) { [0.0; 3] } else { weights }))
     }
 
     /// Returns whether displacements vanish at a knot.

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::constraints::{Request, share_at};
-use super::linear_path::LinearPath;
+use super::linear_path::{LinearPath, path_responses};
 use super::passage::{Passed, Prior};
 use super::residual::{CELLS, Residual};
 use crate::dynamics::additional_forcing::AdditionalForcing;
@@ -17,6 +17,7 @@ use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::model::{Model, Prediction};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
+use crate::numerics::simd::{F64x4, groups, unpack};
 use crate::validate::check_range;
 
 /// Default standard deviation of what the styles leave of a movement, relative to the range. Geometric mean over eight sets of
@@ -154,8 +155,8 @@ pub fn through(
     let base = conditions.clone().or(mean(model, options)?);
     let resolved = base.complete(primitive)?;
     let time = time_of(inside, &base)?;
-    let [start_slope, end_slope] = end_slopes(&resolved, &time);
-    let path = LinearPath::new(inside, &resolved, start_slope, end_slope)?;
+    let responses = path_responses(inside, resolved.has_goal_velocity)?;
+    let path = LinearPath::new(inside, &resolved, end_slopes(&resolved, &time), &responses);
     let deviation = options.deviation.unwrap_or(DEVIATION);
     let allowed = "must be a share of the range, from 0 to 1000";
     check_range("deviation", deviation, (0.0..=1e3).contains(&deviation), allowed)?;
@@ -166,7 +167,7 @@ pub fn through(
     let late = Error::Argument { name: "from_phase", problem: "is the end of the movement: choose an earlier one" };
     let prior = Prior {
         path: &path,
-        covariance: covariance(model, &path, conditions, options),
+        covariance: covariance(model, path.n_parameters(), conditions, options),
         residual: Residual::new(canonical, LENGTH, from).ok_or(late)?,
         variances: scales.iter().map(|scale| (scale * deviation.max(MIN_DEVIATION)).powi(2)).collect(),
         extent: canonical.extent(),
@@ -205,7 +206,7 @@ pub fn through(
 fn mean(model: &Model, options: &PassageOptions) -> Result<Conditions> {
     match &options.prediction {
         Some(prediction) => Ok(prediction.conditions.clone()),
-        None => model.conditions(&(0..model.n_demos()).collect::<Vec<_>>()),
+        None => model.mean(),
     }
 }
 
@@ -229,43 +230,29 @@ fn end_slopes(conditions: &ResolvedConditions, time: &WarpingFunction) -> [Optio
 }
 
 /// Returns the covariance (P, P) of the parameters, zero for those that are given.
-fn covariance(model: &Model, path: &LinearPath, given: &Conditions, options: &PassageOptions) -> DMatrix<f64> {
-    let (n, n_styles, n_dofs) = (path.n_parameters(), model.n_styles(), model.primitive().inside().n_dofs());
-    let discrete = model.kind() == Kind::Discrete;
+fn covariance(model: &Model, n: usize, given: &Conditions, options: &PassageOptions) -> DMatrix<f64> {
+    let (n_styles, n_dofs) = (model.n_styles(), model.primitive().inside().n_dofs());
     let is_given = |p: usize| match p {
         p if p < n_styles => given.style.is_some(),
         p if p < n_styles + n_dofs => given.goal.is_some() || given.anchor.is_some(),
         _ => given.start.is_some(),
     };
     let predicted = options.prediction.as_ref().and_then(|prediction| prediction.covariance.as_ref());
-    let covariance = match predicted {
-        Some(covariance) => DMatrix::from_fn(n, n, |p, q| covariance[[p, q]]),
-        None => {
-            let demonstrated = model.demonstrated();
-            let (m, centres) = (model.n_demos(), if discrete { &demonstrated.goals } else { &demonstrated.anchors });
-            let deviations = DMatrix::from_fn(m, n, |i, p| match p {
-                p if p < n_styles => demonstrated.styles[[i, p]],
-                p if p < n_styles + n_dofs => centres[[i, p - n_styles]],
-                _ => demonstrated.starts[[i, p - n_styles - n_dofs]],
-            });
-            let mean = deviations.row_mean();
-            let deviations = DMatrix::from_fn(m, n, |i, p| deviations[(i, p)] - mean[p]);
-            deviations.tr_mul(&deviations) / (m.max(2) - 1) as f64
-        }
-    };
-    DMatrix::from_fn(n, n, |p, q| if is_given(p) || is_given(q) { 0.0 } else { covariance[(p, q)] })
+    let covariance = predicted.unwrap_or_else(|| model.covariance());
+    let given: Vec<bool> = (0..n).map(is_given).collect();
+    DMatrix::from_fn(n, n, |p, q| if given[p] || given[q] { 0.0 } else { covariance[[p, q]] })
 }
 
 /// Returns the largest displacement of each DoF (D,) relative to its range, at the knots.
 fn largest(forcing: &AdditionalForcing, scales: &[f64], extent: f64) -> Vec<f64> {
-    let mut largest = vec![0.0f64; scales.len()];
-    for k in 0..CELLS {
-        let [displacement, ..] = forcing.displacement(extent * (k as f64 / CELLS as f64));
-        for (largest, (x, scale)) in largest.iter_mut().zip(displacement.iter().zip(scales)) {
-            *largest = largest.max(x.abs() / scale);
+    let mut largest = vec![F64x4::ZERO; groups(scales.len())];
+    for (group, largest) in largest.iter_mut().enumerate() {
+        for k in 0..CELLS {
+            let value = forcing.sample::<F64x4>(group, extent * (k as f64 / CELLS as f64)).value;
+            *largest = largest.fast_max(value.abs());
         }
     }
-    largest
+    unpack(&largest, scales.len()).iter().zip(scales).map(|(largest, scale)| largest / scale).collect()
 }
 
 /// Returns conditions with changed parameters.

@@ -56,18 +56,22 @@ impl Matern52 {
             return self.side(r.abs(), if r < 0.0 { -1.0 } else { 1.0 });
         }
         let r = r - r.floor();
-        let (ahead, behind) = (self.side(r, 1.0), self.side(1.0 - r, -1.0));
-        std::array::from_fn(|i| ahead[i] + behind[i])
+        let (mut derivatives, behind) = (self.side(r, 1.0), self.side(1.0 - r, -1.0));
+        derivatives.iter_mut().zip(behind).for_each(|(ahead, behind)| *ahead += behind);
+        derivatives
     }
 
     /// Returns the derivatives at a distance on one side; odd ones have its sign.
-    #[inline]
+    #[inline(always)]
     fn side(&self, distance: f64, sign: f64) -> [f64; 5] {
         let a = self.rate * distance;
         let decay = (-a).exp();
-        let odd = sign * decay;
-        let [k0, k1, k2, k3, k4] = self.polynomials.map(|[alpha, beta, gamma]| alpha + a * (beta + a * gamma));
-        [decay * k0, odd * k1, decay * k2, odd * k3, decay * k4]
+        let (odd, mut derivatives) = (sign * decay, [decay; 5]);
+        (derivatives[1], derivatives[3]) = (odd, odd);
+        for (derivative, [alpha, beta, gamma]) in derivatives.iter_mut().zip(&self.polynomials) {
+            *derivative *= alpha + a * (beta + a * gamma);
+        }
+        derivatives
     }
 }
 
