@@ -111,30 +111,28 @@ impl Prior<'_> {
     pub(super) fn pass(&self, constraints: &Constraints) -> Option<Passed> {
         let system = self.system(constraints)?;
         let mut errors = DMatrix::from_fn(constraints.rows.len(), 1, |i, _| constraints.rows[i].residual);
-        let residuals = errors.clone();
-        let (mut weights, mut distance) = (DVector::zeros(errors.len()), None);
-        // Large weights of opposite sign leave a rounding error in ΣAᵀλ, but not in the sum of its corrections.
-        let mut change = DVector::zeros(self.covariance.nrows());
+        let mut white = errors.clone();
+        system.factor.whiten(&mut white);
+        let distance = white.norm();
+        let (mut weights, mut change) = (DVector::zeros(errors.len()), DVector::zeros(self.covariance.nrows()));
+        // Large weights of opposite sign leave a rounding error in a sum of products with them, but not in the sum of its
+        // corrections.
+        let mut sum: Option<AdditionalForcing> = None;
         for refinement in 0.. {
-            let mut last = f64::INFINITY;
-            for _ in 0..MAX_REFINEMENTS {
-                system.factor.solve(&mut errors);
-                weights += errors.column(0);
-                change.gemv(1.0, &system.spread, &errors.column(0), 1.0);
-                distance.get_or_insert_with(|| residuals.dot(&errors).max(0.0).sqrt());
-                system.expected_errors(&weights, &change, &mut errors);
-                let error = system.largest(&errors);
-                if !(error > WEIGHT_ACCURACY && error < 0.5 * last) {
-                    break;
-                }
-                last = error;
-            }
-            let forcing = system.displacement(&weights, &change);
+            let (step, step_change) = system.solve(&errors);
+            let correction = system.displacement(&step, &step_change);
+            let forcing = match sum {
+                Some(sum) => sum.plus(&correction).ok()?,
+                None => correction,
+            };
+            weights += step;
+            change += step_change;
             system.errors(&forcing, &weights, &change, &mut errors);
             let error = system.largest(&errors);
             if !(error > ACCURACY && error.is_finite()) || refinement == MAX_REFINEMENTS {
-                return Some(Passed { change, forcing, distance: distance.unwrap_or(0.0), error });
+                return Some(Passed { change, forcing, distance, error });
             }
+            sum = Some(forcing);
         }
         None
     }
@@ -224,14 +222,27 @@ impl System<'_> {
         self.prior.path.product(column(&self.rows, index), dof, change.as_slice())
     }
 
-    /// Computes the errors that weights of a table leave.
-    fn expected_errors(&self, weights: &DVector<f64>, change: &DVector<f64>, errors: &mut DMatrix<f64>) {
-        for (i, row) in self.constraints.rows.iter().enumerate() {
-            let same = self.constraints.rows.iter().zip(weights).filter(|(other, _)| other.dof == row.dof);
-            let own: f64 = same.map(|(other, weight)| weight * self.bridge.tabulated[(row.jet, other.jet)]).sum();
-            let displaced = self.prior.variances[row.dof] * own + self.moved(i, change);
-            errors[i] = row.residual - displaced - row.tolerance * row.tolerance * weights[i];
+    /// Returns the weights λ that remove errors, and ΣAᵀλ, by the known response of a table.
+    fn solve(&self, errors: &DMatrix<f64>) -> (DVector<f64>, DVector<f64>) {
+        let (mut weights, mut change) = (DVector::zeros(errors.len()), DVector::zeros(self.spread.nrows()));
+        let (mut rest, mut last) = (errors.clone(), f64::INFINITY);
+        for _ in 0..MAX_REFINEMENTS {
+            self.factor.solve(&mut rest);
+            weights += rest.column(0);
+            change.gemv(1.0, &self.spread, &rest.column(0), 1.0);
+            for (i, row) in self.constraints.rows.iter().enumerate() {
+                let same = self.constraints.rows.iter().zip(&weights).filter(|(other, _)| other.dof == row.dof);
+                let own: f64 = same.map(|(other, weight)| weight * self.bridge.tabulated[(row.jet, other.jet)]).sum();
+                let displaced = self.prior.variances[row.dof] * own + self.moved(i, &change);
+                rest[i] = errors[i] - displaced - row.tolerance * row.tolerance * weights[i];
+            }
+            let error = self.largest(&rest);
+            if !(error > WEIGHT_ACCURACY && error < 0.5 * last) {
+                break;
+            }
+            last = error;
         }
+        (weights, change)
     }
 
     /// Computes the errors of a displacement.
