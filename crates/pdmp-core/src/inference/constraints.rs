@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::ResolvedConditions;
 use crate::model::primitive::Primitive;
-use crate::validate::{check_finite, check_length, check_range};
+use crate::validate::{check_range, check_vector};
 
 /// Distance of two places, or of a place from an end, that is rounding.
 const SAME_PLACE: f64 = 1e-9;
@@ -62,14 +62,14 @@ impl Request<'_> {
             let problem = "constrain nothing: give each a position or a velocity of at least one DoF";
             return Err(Error::Argument { name: "points", problem });
         }
-        for (name, vector) in [("position", &point.position), ("velocity", &point.velocity)] {
-            if let Some(vector) = vector {
-                check_length(name, vector.len(), given.len(), "DoF of the point")?;
-                check_finite(name, vector)?;
-            }
+        let dofs = self.primitive.dofs_of(&given);
+        if let Some(position) = &point.position {
+            check_vector("position", position, given.len(), "element of the point's dofs")?;
         }
-        let dofs = self.of_dofs(point, &given, v)?;
-        for (dof, position, velocity) in dofs {
+        if let Some(velocity) = &point.velocity {
+            check_vector("velocity", velocity, dofs.len(), "DoF of the point, of which a rotation has three")?;
+        }
+        for (dof, position, velocity) in self.of_dofs(point, &given, &dofs, [v, rate])? {
             if let Some(position) = position {
                 let jet = self.jet(constraints, v, 0);
                 self.constrain(constraints, [jet, dof], position, point.tolerance)?;
@@ -82,22 +82,32 @@ impl Request<'_> {
         Ok(())
     }
 
-    /// Returns DoF, position and velocity of each constraint on a DoF.
-    fn of_dofs(&self, point: &ViaPoint, given: &[usize], v: f64) -> Result<Vec<OfDof>> {
+    /// Returns DoF, position and velocity of each constraint on a DoF, for coordinates with their DoFs.
+    fn of_dofs(&self, point: &ViaPoint, given: &[usize], dofs: &[usize], [v, rate]: [f64; 2]) -> Result<Vec<OfDof>> {
         let at = |vector: &Option<Vec<f64>>, i: usize| vector.as_ref().map(|vector| vector[i]);
         let Some(coordinates) = self.primitive.coordinates() else {
-            return Ok(given
-                .iter()
-                .enumerate()
-                .map(|(i, &d)| (d, at(&point.position, i), at(&point.velocity, i)))
-                .collect());
+            let all = dofs.iter().enumerate();
+            return Ok(all.map(|(i, dof)| (*dof, at(&point.position, i), at(&point.velocity, i))).collect());
         };
-        if point.velocity.is_some() {
-            let problem = "does not apply: a primitive with rotations takes positions of points alone";
-            return Err(Error::Argument { name: "velocity", problem });
+        for rotation in coordinates.rotations() {
+            let columns = rotation.columns.column..rotation.columns.column + 4;
+            match columns.filter(|column| given.contains(column)).count() {
+                0 => {}
+                4 if point.position.is_none() => {
+                    let problem = "of a rotation depends on its orientation: give the point a position, too, or leave the \
+                                   rotation out of dofs";
+                    return Err(Error::Argument { name: "velocity", problem });
+                }
+                4 => {}
+                _ => {
+                    let problem = "have a part of a quaternion: give all four of its coordinates or none";
+                    return Err(Error::Argument { name: "dofs", problem });
+                }
+            }
         }
         // Coordinates that are not given are those of the prior mean.
-        let u = v * self.primitive.canonical().extent();
+        let extent = self.canonical().extent();
+        let u = v * extent;
         let mean = self.jet_at(Functional { place: v, order: 0 }).mean;
         let mut position = vec![0.0; self.primitive.n_coordinates()];
         coordinates.to_position(u, &mean, &mut position);
@@ -105,23 +115,17 @@ impl Request<'_> {
             position[coordinate] = at(&point.position, i).unwrap_or(position[coordinate]);
         }
         coordinates.check("position", &position)?;
-        let mut dofs = vec![0.0; self.scales.len()];
-        coordinates.to_dofs(u, &position, Some(&mean), &mut dofs);
-        let mut constrained = vec![];
-        for rotation in coordinates.rotations() {
-            let columns = rotation.columns.column..rotation.columns.column + 4;
-            match columns.filter(|column| given.contains(column)).count() {
-                0 => {}
-                4 => constrained.extend(rotation.dof..rotation.dof + 3),
-                _ => {
-                    let problem = "have a part of a quaternion: give all four of its coordinates or none";
-                    return Err(Error::Argument { name: "dofs", problem });
-                }
-            }
+        let (mut places, mut velocities) = (vec![0.0; self.scales.len()], vec![0.0; self.scales.len()]);
+        coordinates.to_dofs(u, &position, Some(&mean), &mut places);
+        if let Some(velocity) = &point.velocity {
+            dofs.iter().zip(velocity).for_each(|(dof, x)| velocities[*dof] = *x);
+            coordinates.dof_velocity(u, rate * extent, &places, &mut velocities);
         }
-        constrained
-            .extend(coordinates.plain().iter().filter(|[column, _]| given.contains(column)).map(|[_, dof]| *dof));
-        Ok(constrained.into_iter().map(|dof| (dof, Some(dofs[dof]), None)).collect())
+        let of = |vector: &Option<Vec<f64>>, values: &[f64], dof: usize| vector.as_ref().map(|_| values[dof]);
+        Ok(dofs
+            .iter()
+            .map(|&dof| (dof, of(&point.position, &places, dof), of(&point.velocity, &velocities, dof)))
+            .collect())
     }
 
     /// Adds the constraint that a derivative of a DoF has a value.

@@ -58,7 +58,8 @@ pub struct ViaPoint {
     pub at: At,
     /// Position, one number for each of `dofs`; none for a velocity alone.
     pub position: Option<Vec<f64>>,
-    /// Velocity per second, one number for each of `dofs`.
+    /// Velocity per second, one number for each of `dofs`. A rotation has three in place of its four coordinates: its angular
+    /// velocity in rad/s, in the frame of the model ([`crate::model::Frame`]), at the orientation that `position` gives.
     pub velocity: Option<Vec<f64>>,
     /// Indices of the DoFs, or of the coordinates of a primitive with rotations; all of them if none are given.
     pub dofs: Option<Vec<usize>>,
