@@ -265,7 +265,8 @@ typedef struct {
     const double *phase;
     /// Position, one number for each of `dofs`; not given for a velocity alone.
     pdmp_vector position;
-    /// Velocity per second, one number for each of `dofs`; not given for a position alone.
+    /// Velocity per second, one number for each of `dofs`; not given for a position alone. A rotation has three in place of its
+    /// four coordinates: its angular velocity in rad/s, as in velocities of controllers, at the orientation in `position`.
     pdmp_vector velocity;
     /// Degrees of freedom, or coordinates of a model with rotations, counted from 0; NULL for all of them.
     const size_t *dofs;

@@ -45,7 +45,7 @@ pub(super) struct Prior<'a> {
     pub(super) variances: Vec<f64>,
     /// Clock over the share v.
     pub(super) extent: f64,
-    /// Whether the displacement carries the change of the parameters, which then remain.
+    /// True if the displacement carries the change of the parameters, which then remain.
     pub(super) carries: bool,
 }
 
