@@ -265,6 +265,8 @@ pub(super) struct Change<'a> {
 
 impl Change<'_> {
     /// Adds the change and its two derivatives at `v` in [0, 1] to those of all groups.
+    // Closures of iterators stay calls, into which the instructions of larger registers are not inlined.
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     pub(super) fn add_to<T: Register>(&self, v: f64, jets: &mut [[F64x4; 3]]) {
         let LinearPath { n_dofs, curves, scales, .. } = self.path;

@@ -242,8 +242,8 @@ impl Kernel for Knots<'_> {
                 change.add_to::<T>(v - v.floor(), jets);
             }
             for jet in jets {
-                jet[1] = jet[1] * extent.recip();
-                jet[2] = jet[2] * (extent * extent).recip();
+                jet[1] *= extent.recip();
+                jet[2] *= (extent * extent).recip();
             }
         }
         if residual.ends.is_empty() {
