@@ -119,7 +119,10 @@ impl Request<'_> {
         coordinates.to_dofs(u, &position, Some(&mean), &mut places);
         if let Some(velocity) = &point.velocity {
             dofs.iter().zip(velocity).for_each(|(dof, x)| velocities[*dof] = *x);
-            coordinates.dof_velocity(u, rate * extent, &places, &mut velocities);
+            coordinates.relative_velocity(u, &places, &mut velocities);
+            coordinates.for_each_drift(u, &places, |dof, drift| {
+                drift.iter().enumerate().for_each(|(i, drift)| velocities[dof + i] -= drift * rate * extent);
+            });
         }
         let of = |vector: &Option<Vec<f64>>, values: &[f64], dof: usize| vector.as_ref().map(|_| values[dof]);
         Ok(dofs

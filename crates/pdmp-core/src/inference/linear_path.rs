@@ -169,7 +169,7 @@ impl<'a> LinearPath<'a> {
     }
 
     /// Returns the scalar product of the coefficients (width,) of a DoF with parameters (P,).
-    pub(super) fn product(&self, row: &[f64], dof: usize, parameters: &[f64]) -> f64 {
+    pub(super) fn row_product(&self, row: &[f64], dof: usize, parameters: &[f64]) -> f64 {
         let (styles, rest) = row.split_at(self.n_styles);
         let sum: f64 = styles.iter().zip(parameters).map(|(a, x)| a * x).sum();
         let own = rest.iter().enumerate();

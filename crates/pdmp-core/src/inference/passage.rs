@@ -174,7 +174,7 @@ impl Prior<'_> {
             matrix[(i, i)] = a.tolerance * a.tolerance;
             for (j, b) in constraints.rows.iter().enumerate().skip(i) {
                 let own = if a.dof == b.dof { self.variances[a.dof] * bridge.covariance[(a.jet, b.jet)] } else { 0.0 };
-                matrix[(j, i)] += own + path.product(column(&rows, j), b.dof, column(&spread, i));
+                matrix[(j, i)] += own + path.row_product(column(&rows, j), b.dof, column(&spread, i));
             }
         }
         let factor = Factor::new(matrix)?;
@@ -219,7 +219,7 @@ impl System<'_> {
     /// Returns aᵀΔθ of a constraint.
     fn moved(&self, index: usize, change: &DVector<f64>) -> f64 {
         let dof = self.constraints.rows[index].dof;
-        self.prior.path.product(column(&self.rows, index), dof, change.as_slice())
+        self.prior.path.row_product(column(&self.rows, index), dof, change.as_slice())
     }
 
     /// Returns the weights λ that remove errors, and ΣAᵀλ, by the known response of a table.

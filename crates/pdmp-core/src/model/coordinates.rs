@@ -267,12 +267,6 @@ impl Coordinates {
         }
     }
 
-    /// Converts velocities to those of the DoFs at `dofs` and clock `u`, for the rate of the mean rotation.
-    pub(crate) fn dof_velocity(&self, u: f64, rate: f64, dofs: &[f64], velocity: &mut [f64]) {
-        self.relative_velocity(u, dofs, velocity);
-        self.for_each_drift(u, dofs, |dof, drift| (0..3).for_each(|i| velocity[dof + i] -= drift[i] * rate));
-    }
-
     /// Calls a function with the first DoF of each rotation and the velocity J⁻¹(δ)exp(δ)ᵀω̄ of its DoFs, per unit of the
     /// clock, which offsets the motion of the mean rotation.
     pub(crate) fn for_each_drift(&self, u: f64, dofs: &[f64], mut visit: impl FnMut(usize, Vector)) {
