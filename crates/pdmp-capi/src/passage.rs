@@ -143,7 +143,8 @@ impl pdmp_passage_options {
 /// `*passage` is set to the new passage, which the caller frees with pdmp_passage_free, or to NULL on error.
 ///
 /// This function allocates. Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE for no point, one outside of the movement or before
-/// `from_phase`, a number that is not finite, points that contradict each other or the conditions, or more than 500 numbers;
+/// `from_phase`, a number that is not finite, the velocity of a rotation without its orientation, points that contradict each
+/// other or the conditions, or more than 500 numbers;
 /// PDMP_ABSENT if a condition does not apply to the kind of model, or for a context if the model was fitted without contexts.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_model_through(

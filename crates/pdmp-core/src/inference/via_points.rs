@@ -142,8 +142,9 @@ impl Passage {
 /// ```
 ///
 /// # Errors
-/// No point; one outside of the movement or before `from_phase`; a vector of a wrong length or a number that is not finite; a
-/// negative tolerance or deviation; points that contradict each other or the given conditions; more than 500 numbers.
+/// No point; one outside of the movement or before `from_phase`; a vector of a wrong length or a number that is not finite; the
+/// velocity of a rotation without its orientation; a negative tolerance or deviation; points that contradict each other or the
+/// given conditions; more than 500 numbers.
 pub fn through(
     model: &Model,
     points: &[ViaPoint],
