@@ -144,6 +144,65 @@ fn movement_is_the_posterior_mean_of_a_dense_gaussian() {
     assert!((passage.distance - residual.dot(&weights).sqrt()).abs() < 1e-4 * passage.distance);
 }
 
+/// Under way, the displacement is the posterior mean of a dense Gaussian in which movements have left with three equal samples,
+/// and end with three.
+#[test]
+fn displacement_under_way_is_the_posterior_mean_of_a_dense_gaussian() {
+    const FINE: usize = 5000;
+    let model = &*REACH;
+    let (conditions, _) = mean(model);
+    let (n_dofs, m) = (model.n_dofs(), model.n_demos());
+    let dt = duration(&conditions) / FINE as f64;
+    let times = || Conditions { segment_durations: conditions.segment_durations.clone(), ..Conditions::default() };
+    let fine = |one: Conditions| {
+        let grid = TimeGrid { dt, duration: None };
+        rollout(model.primitive(), &times().or(one), grid).unwrap().position
+    };
+    let centre = fine(conditions.clone());
+    let points = [2600, 3900];
+    let ends = [1499, 1500, 1501, FINE - 2, FINE - 1, FINE];
+    let samples: Vec<usize> = ends.into_iter().chain(points).chain((1600..FINE).step_by(150)).collect();
+    let size = samples.len() * n_dofs;
+    let mut covariance = DMatrix::zeros(size, size);
+    for demo in 0..m {
+        let off = fine(conditions_of(model, demo)) - &centre;
+        let deviation = DVector::from_fn(size, |i, _| off[[samples[i / n_dofs], i % n_dofs]]);
+        covariance += &deviation * deviation.transpose() / (m - 1) as f64;
+    }
+    for i in 0..size {
+        for j in (i % n_dofs..size).step_by(n_dofs) {
+            let a = 5f64.sqrt() * samples[i / n_dofs].abs_diff(samples[j / n_dofs]) as f64 / (0.2 * FINE as f64);
+            let sd = 0.03 * model.ranges()[i % n_dofs];
+            covariance[(i, j)] += sd * sd * (1.0 + a + a * a / 3.0) * (-a).exp();
+        }
+    }
+    let given: Vec<usize> = (0..6 * n_dofs).chain([6, 7].map(|k| k * n_dofs + 1)).collect();
+    let offsets = [0.1, -0.05];
+    let residual = DVector::from_fn(given.len(), |i, _| if i < 6 * n_dofs { 0.0 } else { offsets[i - 6 * n_dofs] });
+    let own = DMatrix::from_fn(given.len(), given.len(), |i, j| covariance[(given[i], given[j])]);
+    let weights = own.lu().solve(&residual).unwrap();
+    let expected = DMatrix::from_fn(size, given.len(), |i, j| covariance[(i, given[j])]) * &weights;
+
+    let point = |k: usize, offset: f64| ViaPoint {
+        dofs: Some(vec![1]),
+        ..ViaPoint::new(At::Time(k as f64 * dt), vec![centre[[k, 1]] + offset])
+    };
+    let extent = model.canonical().extent();
+    let from_phase = Some(model.canonical().phase(extent * ends[1] as f64 / FINE as f64));
+    let options = PassageOptions { from_phase, ..PassageOptions::default() };
+    let points = [point(points[0], offsets[0]), point(points[1], offsets[1])];
+    let passage = through(model, &points, &times(), &options).unwrap();
+    assert_eq!(passage.conditions.style, conditions.style);
+    for (k, expected) in samples.iter().zip(expected.as_slice().chunks(n_dofs)) {
+        let [found, ..] = passage.forcing.displacement(extent * *k as f64 / FINE as f64);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-4, "{found} instead of {expected} at {k}");
+        }
+    }
+    let distance = residual.dot(&weights).sqrt();
+    assert!((passage.distance - distance).abs() < 1e-3 * distance, "{} {distance}", passage.distance);
+}
+
 /// A deviation of zero leaves the forcing without effect if the parameters suffice; if these are given, the forcing alone leads
 /// to the point.
 #[test]

@@ -167,13 +167,14 @@ pub fn through(
     let discrete = inside.kind() == Kind::Discrete;
     let from = options.from_phase.map(|phase| share_at(canonical, "from_phase", phase)).transpose()?;
     let late = Error::Argument { name: "from_phase", problem: "is the end of the movement: choose an earlier one" };
+    let covariance = covariance(model, path.n_parameters(), conditions, options);
     let prior = Prior {
         path: &path,
-        covariance: covariance(model, path.n_parameters(), conditions, options),
+        carries: from.is_some() && covariance.iter().any(|x| *x != 0.0),
+        covariance,
         residual: Residual::new(canonical, LENGTH, from).ok_or(late)?,
         variances: scales.iter().map(|scale| (scale * deviation.max(MIN_DEVIATION)).powi(2)).collect(),
         extent: canonical.extent(),
-        carries: from.is_some(),
     };
     let parameters = [&resolved.style, &resolved.centre].into_iter().chain(resolved.start.iter().filter(|_| discrete));
     let parameters: Vec<f64> = parameters.flatten().copied().collect();
