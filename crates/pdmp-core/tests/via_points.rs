@@ -144,6 +144,32 @@ fn movement_is_the_posterior_mean_of_a_dense_gaussian() {
     assert!((passage.distance - residual.dot(&weights).sqrt()).abs() < 1e-4 * passage.distance);
 }
 
+/// Points right after the departure, and right before it in the next period, are passed under way.
+#[test]
+fn points_near_the_departure_are_passed() {
+    for (model, samples) in [(&REACH, [61, 120, 199]), (&CYCLE, [61, 120, 58])] {
+        let (conditions, positions) = mean(model);
+        let step = duration(&conditions) / STEPS as f64;
+        let from_phase = Some(model.canonical().phase(0.3 * model.canonical().extent()));
+        let wanted = |k: usize| -> Vec<f64> {
+            let size = if k == 120 { 0.1 } else { 1e-4 };
+            positions.row(k).iter().zip(model.ranges()).map(|(y, range)| y + size * range).collect()
+        };
+        let points = samples.map(|k| ViaPoint::new(At::Time(k as f64 * step), wanted(k)));
+        for deviation in [0.0, 0.03] {
+            let options = PassageOptions { from_phase, deviation: Some(deviation), ..PassageOptions::default() };
+            let times = Conditions { segment_durations: conditions.segment_durations.clone(), ..Conditions::default() };
+            let passage = through(model, &points, &times, &options).unwrap();
+            let found = movement(model, &passage.conditions, 1);
+            for k in samples {
+                for ((found, wanted), range) in found.row(k).iter().zip(wanted(k)).zip(model.ranges()) {
+                    assert!((found - wanted).abs() < 1e-9 * range, "{deviation} at {k}: {:e}", found - wanted);
+                }
+            }
+        }
+    }
+}
+
 /// Under way, the displacement is the posterior mean of a dense Gaussian in which movements have left with three equal samples,
 /// and end with three.
 #[test]

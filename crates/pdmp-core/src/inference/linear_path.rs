@@ -78,7 +78,8 @@ pub(super) struct LinearPath<'a> {
 
 /// Derivative of a movement as a sum of samples of its curve and two derivatives of that, in units of the share v.
 pub(super) struct Samples {
-    order: usize,
+    /// That of a curve of constant 1.
+    constant: f64,
     /// Sample, order of its derivative and weight.
     terms: Vec<(usize, usize, f64)>,
 }
@@ -86,15 +87,15 @@ pub(super) struct Samples {
 impl Samples {
     /// Returns the derivative of order `order` at `v` in [0, 1].
     pub(super) fn at(v: f64, order: usize) -> Self {
-        let mut samples = Self { order, terms: Vec::with_capacity(6) };
+        let mut samples = Self { constant: if order == 0 { 1.0 } else { 0.0 }, terms: Vec::with_capacity(6) };
         samples.add(v, order, 1.0);
         samples
     }
 
-    /// Returns the derivative of order `order` of a curve that interpolates value and two derivatives at knots, with their
-    /// weights.
-    pub(super) fn between(knots: &[(f64, [f64; 3])], order: usize) -> Self {
-        let mut samples = Self { order, terms: Vec::with_capacity(18 * knots.len()) };
+    /// Returns that of a curve that interpolates value and two derivatives at knots, with their weights.
+    pub(super) fn between(knots: &[(f64, [f64; 3])]) -> Self {
+        let constant = knots.iter().map(|(_, weights)| weights[0]).sum();
+        let mut samples = Self { constant, terms: Vec::with_capacity(6 * knots.len()) };
         for (v, weights) in knots {
             weights.iter().enumerate().for_each(|(order, weight)| samples.add(*v, order, *weight));
         }
@@ -207,7 +208,7 @@ impl<'a> LinearPath<'a> {
         for (j, row) in rows.chunks_mut(n).take(self.n_styles).enumerate() {
             self.add(j, samples, self.amplitude, row);
         }
-        let constant = if samples.order == 0 { 1.0 } else { 0.0 };
+        let constant = samples.constant;
         let (styles, centres) = rows.split_at_mut(n * self.n_styles);
         let (centres, starts) = centres.split_at_mut(n);
         if self.kind == Kind::Rhythmic {

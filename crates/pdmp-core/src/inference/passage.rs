@@ -154,7 +154,7 @@ impl Prior<'_> {
         let exact: Vec<Vec<f64>> = jets.map(|(i, jet)| less(jet.rows.clone(), &bridge.gains, i)).collect();
         let tabulated = |i: usize| {
             let knots = self.residual.knots(functionals[i]).map(|(v, weights)| (v - v.floor(), weights));
-            less(path.rows(&Samples::between(&knots, functionals[i].order)).0, &bridge.tabulated_gains, i)
+            less(path.rows(&Samples::between(&knots)).0, &bridge.tabulated_gains, i)
         };
         let table: Vec<Vec<f64>> = (0..functionals.len()).filter(|_| self.carries).map(tabulated).collect();
         let (n, n_dofs) = (constraints.rows.len(), self.variances.len());
