@@ -83,6 +83,56 @@ def test_distant_points_are_said(model: pdmp.Model) -> None:
     assert passage.far and passage.distance > 5
 
 
+@pytest.fixture(scope="module", params=["body", "world"])
+def poses(request: pytest.FixtureRequest) -> pdmp.Model:
+    """Returns a model of poses that move along x and turn about an axis of their own."""
+    s = np.linspace(0, 1, 101)
+    eased = s**3 * (10 - 15 * s + 6 * s**2)
+    demos = []
+    for lift, tilt in ((0.1, 0.2), (0.2, -0.1), (0.3, 0.3), (0.15, -0.3)):
+        bump = np.sin(np.pi * s) ** 2
+        turns = np.column_stack([1.2 * eased, tilt * bump, 0.5 * lift * eased])
+        position = np.column_stack([0.4 * eased, 0.1 * eased, lift * bump])
+        quaternions = pdmp.preprocessing.rotation_vectors_to_quaternions(turns, order="wxyz")
+        coordinates = np.hstack([position, quaternions])
+        demos.append(pdmp.Demonstration(coordinates, dt=DT, rotations={3: "wxyz"}))
+    return pdmp.fit(demos, n_styles=3, rotation_frame=request.param)
+
+
+def test_poses_and_angular_velocities_are_passed(poses: pdmp.Model) -> None:
+    """A pose with a velocity in the frame of the model is passed; the mean one has no effect."""
+    mean = poses.conditions(range(poses.n_demos))
+    before = poses.rollout(mean, dt=DT)
+    point = pdmp.ViaPoint(0.4, before.position[40], velocity=before.velocity[40])
+    same = poses.through(point, tau=mean.tau)
+    assert same.distance < 1e-6 and same.n_constraints == 12
+    assert np.allclose(poses.rollout(same.conditions, dt=DT).position, before.position, atol=1e-8)
+
+    wanted = 0.95 * before.velocity[40] + [0.0, 0.0, 0.05, 0.0, 0.1, 0.0]
+    place = before.position[41]
+    passage = poses.through(pdmp.ViaPoint(0.4, place, velocity=wanted), tau=mean.tau)
+    found = poses.rollout(passage.conditions, dt=DT)
+    assert passage.distance > 0.1
+    assert abs(abs(found.position[40, 3:] @ place[3:]) - 1) < 1e-9
+    assert np.abs(found.velocity[40] - wanted).max() < 1e-6
+
+    turn = {"position": place[3:], "dofs": [3, 4, 5, 6]}
+    passage = poses.through(pdmp.ViaPoint(0.4, velocity=wanted[3:], **turn), tau=mean.tau)
+    found = poses.rollout(passage.conditions, dt=DT)
+    assert np.abs(found.velocity[40, 3:] - wanted[3:]).max() < 1e-6
+
+
+def test_angular_velocities_need_an_orientation(poses: pdmp.Model) -> None:
+    """Errors say how many numbers a rotation has, and that its velocity needs an orientation."""
+    position = poses.rollout(dt=DT).position[40]
+    with pytest.raises(ValueError, match="length 7, expected 6.*a rotation has three"):
+        poses.through(pdmp.ViaPoint(0.4, position, velocity=np.zeros(7)))
+    with pytest.raises(ValueError, match="give the point a position, too"):
+        poses.through(pdmp.ViaPoint(0.4, velocity=np.zeros(6)))
+    with pytest.raises(ValueError, match="all four"):
+        poses.through(pdmp.ViaPoint(0.4, [0.0], dofs=[3]))
+
+
 @pytest.mark.parametrize(
     ("point", "text"),
     [

@@ -265,7 +265,8 @@ typedef struct {
     const double *phase;
     /// Position, one number for each of `dofs`; not given for a velocity alone.
     pdmp_vector position;
-    /// Velocity per second, one number for each of `dofs`; not given for a position alone.
+    /// Velocity per second, one number for each of `dofs`; not given for a position alone. A rotation has three in place of its
+    /// four coordinates: its angular velocity in rad/s, as in velocities of controllers, at the orientation in `position`.
     pdmp_vector velocity;
     /// Degrees of freedom, or coordinates of a model with rotations, counted from 0; NULL for all of them.
     const size_t *dofs;
@@ -624,7 +625,8 @@ pdmp_status pdmp_controller_forecast(pdmp_controller *controller,
 /// `*passage` is set to the new passage, which the caller frees with pdmp_passage_free, or to NULL on error.
 ///
 /// This function allocates. Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE for no point, one outside of the movement or before
-/// `from_phase`, a number that is not finite, points that contradict each other or the conditions, or more than 500 numbers;
+/// `from_phase`, a number that is not finite, the velocity of a rotation without its orientation, points that contradict each
+/// other or the conditions, or more than 500 numbers;
 /// PDMP_ABSENT if a condition does not apply to the kind of model, or for a context if the model was fitted without contexts.
 pdmp_status pdmp_model_through(const pdmp_model *model,
                                const pdmp_point *points,

@@ -31,7 +31,8 @@ pub struct pdmp_point {
     pub phase: *const f64,
     /// Position, one number for each of `dofs`; not given for a velocity alone.
     pub position: pdmp_vector,
-    /// Velocity per second, one number for each of `dofs`; not given for a position alone.
+    /// Velocity per second, one number for each of `dofs`; not given for a position alone. A rotation has three in place of its
+    /// four coordinates: its angular velocity in rad/s, as in velocities of controllers, at the orientation in `position`.
     pub velocity: pdmp_vector,
     /// Degrees of freedom, or coordinates of a model with rotations, counted from 0; NULL for all of them.
     pub dofs: *const usize,
@@ -82,10 +83,19 @@ impl pdmp_point {
             // SAFETY: `dofs` is not NULL, so the caller guarantees `length` readable numbers.
             unsafe { slice::from_raw_parts(self.dofs, length) }.to_vec()
         });
-        let expected = dofs.as_ref().map_or(model.n_coordinates(), Vec::len);
-        let per = if dofs.is_some() { "element of dofs" } else { per_coordinate(model) };
-        // SAFETY: this function has the same contract for every vector.
-        let vector = |name, vector: pdmp_vector| unsafe { vector.get(name, expected, per) };
+        let n_coordinates = dofs.as_ref().map_or(model.n_coordinates(), Vec::len);
+        let n_velocities = dofs.as_ref().map_or(model.n_dofs(), |dofs| model.primitive().dofs_of(dofs).len());
+        let [per, per_velocity] = match dofs {
+            Some(_) => ["element of dofs", "DoF of the point, of which a rotation has three"],
+            None => [per_coordinate(model), "DoF"],
+        };
+        // SAFETY: the caller guarantees that the vectors are not given or valid.
+        let (position, velocity) = unsafe {
+            (
+                self.position.get("position", n_coordinates, per)?.map(<[f64]>::to_vec),
+                self.velocity.get("velocity", n_velocities, per_velocity)?.map(<[f64]>::to_vec),
+            )
+        };
         // SAFETY: the caller guarantees that the pointers are NULL or valid.
         let [time, phase] = [self.time, self.phase].map(|number| unsafe { number.as_ref() }.copied());
         let at = match (time, phase) {
@@ -96,13 +106,7 @@ impl pdmp_point {
                 return Err(Error::Argument { name: "points", problem }.into());
             }
         };
-        Ok(ViaPoint {
-            at,
-            position: vector("position", self.position)?.map(<[f64]>::to_vec),
-            velocity: vector("velocity", self.velocity)?.map(<[f64]>::to_vec),
-            dofs,
-            tolerance: self.tolerance,
-        })
+        Ok(ViaPoint { at, position, velocity, dofs, tolerance: self.tolerance })
     }
 }
 
@@ -139,7 +143,8 @@ impl pdmp_passage_options {
 /// `*passage` is set to the new passage, which the caller frees with pdmp_passage_free, or to NULL on error.
 ///
 /// This function allocates. Errors: PDMP_NULL; PDMP_LENGTH; PDMP_RANGE for no point, one outside of the movement or before
-/// `from_phase`, a number that is not finite, points that contradict each other or the conditions, or more than 500 numbers;
+/// `from_phase`, a number that is not finite, the velocity of a rotation without its orientation, points that contradict each
+/// other or the conditions, or more than 500 numbers;
 /// PDMP_ABSENT if a condition does not apply to the kind of model, or for a context if the model was fitted without contexts.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pdmp_model_through(

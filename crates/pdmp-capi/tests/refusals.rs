@@ -946,6 +946,46 @@ fn points_that_no_movement_passes_are_refused() {
     assert_eq!(passage(&model, &[valid], Some(&anchored), None).err().unwrap().0, PDMP_ABSENT);
 }
 
+/// An angular velocity is passed as in Rust, with three numbers in place of the four of its orientation.
+#[test]
+fn poses_pass_angular_velocities() {
+    let demos: Vec<_> = poses::screws(4, 2.0, 0.4, 101, 1).into_iter().map(poses::pose).collect();
+    let rust = learn(&demos, &options(Kind::Discrete));
+    let (_, model, _) = load(&rust.to_bytes().unwrap());
+    // SAFETY: the model is new, and the library allocates it as a `Box`.
+    let model = unsafe { Box::from_raw(model) };
+    let (time, columns) = (0.4, [3usize, 4, 5, 6]);
+    let (orientation, omega) = (poses::turn([0.6, 0.0, 0.8], 0.8), [0.5, -0.2, 1.5]);
+    let point = pdmp_point {
+        position: vector(&orientation),
+        velocity: vector(&omega),
+        dofs: columns.as_ptr(),
+        n_dofs: 4,
+        ..point_at(&time)
+    };
+    let passed = passage(&model, &[point], None, None).unwrap();
+    let info = describe(&passed);
+    let (status, controller, _) = start(&model, &SETTINGS, Some(&info.conditions));
+    assert_eq!((status, info.n_constraints), (PDMP_OK, 6));
+    let mut running = Running(controller);
+    (0..400).for_each(|_| assert_eq!(pdmp_controller_step(running.handle()), PDMP_WORKING));
+    let (mut position, mut velocity) = ([0.0; 7], [0.0; 6]);
+    let outputs =
+        pdmp_motion { position: buffer(&mut position), velocity: buffer(&mut velocity), acceleration: NO_BUFFER };
+    // SAFETY: the buffers are valid over their lengths.
+    assert_eq!(unsafe { pdmp_controller_read(running.handle(), Some(&outputs)) }, PDMP_WORKING);
+    let found = std::array::from_fn(|i| position[3 + i]);
+    assert!(poses::angle(found, orientation) < 1e-8, "{position:?}");
+    assert!(velocity[3..].iter().zip(omega).all(|(a, b)| (a - b).abs() < 1e-6), "{velocity:?}");
+
+    let long = pdmp_point { velocity: vector(&orientation), ..point };
+    let (status, text) = passage(&model, &[long], None, None).err().unwrap();
+    assert!(status == PDMP_LENGTH && text.contains("expected 3"), "{text}");
+    let alone = pdmp_point { position: NO_VECTOR, ..point };
+    let (status, text) = passage(&model, &[alone], None, None).err().unwrap();
+    assert!(status == PDMP_RANGE && text.contains("give the point a position, too"), "{text}");
+}
+
 /// Points of extreme numbers are refused with a message, or their movement has finite numbers.
 #[test]
 fn random_points_are_refused_or_passed_in_finite_numbers() {

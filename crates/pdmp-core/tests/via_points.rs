@@ -8,17 +8,19 @@ mod counting;
 #[path = "common/poses.rs"]
 mod poses;
 
+use std::sync::Arc;
+
 use common::*;
 use counting as random;
 use counting::allocations;
 use nalgebra::{DMatrix, DVector};
 use ndarray::Array2;
 use pdmp_core::inference::{At, Passage, PassageOptions, ViaPoint, through};
-use pdmp_core::model::Derivative;
+use pdmp_core::model::{Derivative, Frame};
 use pdmp_core::motion::{BatchConditions, Limits, TimeGrid, batch, fastest};
 use pdmp_core::numerics::Threads;
 use pdmp_core::{Conditions, Controller, Kind, Model, rollout};
-use poses::{pose, screws};
+use poses::{angle, pose, rotation, screws, turning, wobbles};
 use proptest::prelude::*;
 
 const STEPS: usize = 200;
@@ -140,6 +142,91 @@ fn movement_is_the_posterior_mean_of_a_dense_gaussian() {
     let error = (&found - &expected).amax();
     assert!(error < 2e-4 * expected.amax(), "{error:e} of {:e}", expected.amax());
     assert!((passage.distance - residual.dot(&weights).sqrt()).abs() < 1e-4 * passage.distance);
+}
+
+/// Points right after the departure, and right before it in the next period, are passed under way.
+#[test]
+fn points_near_the_departure_are_passed() {
+    for (model, samples) in [(&REACH, [61, 120, 199]), (&CYCLE, [61, 120, 58])] {
+        let (conditions, positions) = mean(model);
+        let step = duration(&conditions) / STEPS as f64;
+        let from_phase = Some(model.canonical().phase(0.3 * model.canonical().extent()));
+        let wanted = |k: usize| -> Vec<f64> {
+            let size = if k == 120 { 0.1 } else { 1e-4 };
+            positions.row(k).iter().zip(model.ranges()).map(|(y, range)| y + size * range).collect()
+        };
+        let points = samples.map(|k| ViaPoint::new(At::Time(k as f64 * step), wanted(k)));
+        for deviation in [0.0, 0.03] {
+            let options = PassageOptions { from_phase, deviation: Some(deviation), ..PassageOptions::default() };
+            let times = Conditions { segment_durations: conditions.segment_durations.clone(), ..Conditions::default() };
+            let passage = through(model, &points, &times, &options).unwrap();
+            let found = movement(model, &passage.conditions, 1);
+            for k in samples {
+                for ((found, wanted), range) in found.row(k).iter().zip(wanted(k)).zip(model.ranges()) {
+                    assert!((found - wanted).abs() < 1e-9 * range, "{deviation} at {k}: {:e}", found - wanted);
+                }
+            }
+        }
+    }
+}
+
+/// Under way, the displacement is the posterior mean of a dense Gaussian in which movements have left with three equal samples,
+/// and end with three.
+#[test]
+fn displacement_under_way_is_the_posterior_mean_of_a_dense_gaussian() {
+    const FINE: usize = 5000;
+    let model = &*REACH;
+    let (conditions, _) = mean(model);
+    let (n_dofs, m) = (model.n_dofs(), model.n_demos());
+    let dt = duration(&conditions) / FINE as f64;
+    let times = || Conditions { segment_durations: conditions.segment_durations.clone(), ..Conditions::default() };
+    let fine = |one: Conditions| {
+        let grid = TimeGrid { dt, duration: None };
+        rollout(model.primitive(), &times().or(one), grid).unwrap().position
+    };
+    let centre = fine(conditions.clone());
+    let points = [2600, 3900];
+    let ends = [1499, 1500, 1501, FINE - 2, FINE - 1, FINE];
+    let samples: Vec<usize> = ends.into_iter().chain(points).chain((1600..FINE).step_by(150)).collect();
+    let size = samples.len() * n_dofs;
+    let mut covariance = DMatrix::zeros(size, size);
+    for demo in 0..m {
+        let off = fine(conditions_of(model, demo)) - &centre;
+        let deviation = DVector::from_fn(size, |i, _| off[[samples[i / n_dofs], i % n_dofs]]);
+        covariance += &deviation * deviation.transpose() / (m - 1) as f64;
+    }
+    for i in 0..size {
+        for j in (i % n_dofs..size).step_by(n_dofs) {
+            let a = 5f64.sqrt() * samples[i / n_dofs].abs_diff(samples[j / n_dofs]) as f64 / (0.2 * FINE as f64);
+            let sd = 0.03 * model.ranges()[i % n_dofs];
+            covariance[(i, j)] += sd * sd * (1.0 + a + a * a / 3.0) * (-a).exp();
+        }
+    }
+    let given: Vec<usize> = (0..6 * n_dofs).chain([6, 7].map(|k| k * n_dofs + 1)).collect();
+    let offsets = [0.1, -0.05];
+    let residual = DVector::from_fn(given.len(), |i, _| if i < 6 * n_dofs { 0.0 } else { offsets[i - 6 * n_dofs] });
+    let own = DMatrix::from_fn(given.len(), given.len(), |i, j| covariance[(given[i], given[j])]);
+    let weights = own.lu().solve(&residual).unwrap();
+    let expected = DMatrix::from_fn(size, given.len(), |i, j| covariance[(i, given[j])]) * &weights;
+
+    let point = |k: usize, offset: f64| ViaPoint {
+        dofs: Some(vec![1]),
+        ..ViaPoint::new(At::Time(k as f64 * dt), vec![centre[[k, 1]] + offset])
+    };
+    let extent = model.canonical().extent();
+    let from_phase = Some(model.canonical().phase(extent * ends[1] as f64 / FINE as f64));
+    let options = PassageOptions { from_phase, ..PassageOptions::default() };
+    let points = [point(points[0], offsets[0]), point(points[1], offsets[1])];
+    let passage = through(model, &points, &times(), &options).unwrap();
+    assert_eq!(passage.conditions.style, conditions.style);
+    for (k, expected) in samples.iter().zip(expected.as_slice().chunks(n_dofs)) {
+        let [found, ..] = passage.forcing.displacement(extent * *k as f64 / FINE as f64);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-4, "{found} instead of {expected} at {k}");
+        }
+    }
+    let distance = residual.dot(&weights).sqrt();
+    assert!((passage.distance - distance).abs() < 1e-3 * distance, "{} {distance}", passage.distance);
 }
 
 /// A deviation of zero leaves the forcing without effect if the parameters suffice; if these are given, the forcing alone leads
@@ -333,6 +420,143 @@ fn rotations_are_passed() {
     }
     let part = ViaPoint { dofs: Some(vec![3, 4]), ..ViaPoint::new(At::Time(time), vec![1.0, 0.0]) };
     assert!(plain(&model, &[part]).is_err());
+}
+
+/// Models of poses, and of a rotation that turns about once a cycle.
+fn turning_models() -> [Arc<Model>; 2] {
+    let demos: Vec<_> = screws(5, 2.0, 0.3, 101, 1).into_iter().map(pose).collect();
+    let cycles: Vec<_> = wobbles(5, 1.0, 100).iter().map(turning).collect();
+    [learn(&demos, &options(Kind::Discrete)), learn(&cycles, &options(Kind::Rhythmic))]
+}
+
+/// Velocities at a sample of a movement in steps of a given length.
+fn velocities(model: &Model, conditions: &Conditions, step: f64, k: usize) -> Vec<f64> {
+    let grid = TimeGrid { dt: step, duration: Some(step * k as f64) };
+    rollout(model.primitive(), conditions, grid).unwrap().velocity.row(k).to_vec()
+}
+
+/// An orientation and an angular velocity that the mean movement has leave it as it is; others are passed, in both frames and
+/// at any duration.
+#[test]
+fn angular_velocities_are_passed() {
+    for plain in turning_models() {
+        for frame in [Frame::Body, Frame::World] {
+            let model = plain.in_frame(frame).unwrap();
+            for factor in [1.0, 1.6] {
+                let given = Conditions { tau: Some(factor * model.tau()), ..Conditions::default() };
+                let mean = Conditions { segment_durations: None, ..mean(&model).0 }.or(given.clone());
+                let (k, step) = (80, factor * model.duration() / STEPS as f64);
+                let grid = TimeGrid { dt: step, duration: None };
+                let movement = |conditions: &Conditions| rollout(model.primitive(), conditions, grid).unwrap();
+                let before = movement(&mean);
+                let mut point = ViaPoint::new(At::Time(k as f64 * step), before.position.row(k).to_vec());
+                point.velocity = Some(before.velocity.row(k).to_vec());
+                let pass = |point: &ViaPoint| {
+                    through(&model, std::slice::from_ref(point), &given, &PassageOptions::default()).unwrap()
+                };
+                let same = pass(&point);
+                assert!(same.distance < 1e-6, "{}", same.distance);
+                assert!((movement(&same.conditions).position - &before.position).iter().all(|x| x.abs() < 1e-8));
+
+                // The orientation of a later sample, and another velocity.
+                point.position = Some(before.position.row(k + 8).to_vec());
+                let wanted: Vec<f64> =
+                    before.velocity.row(k).iter().enumerate().map(|(i, x)| 0.7 * x + 0.1 * i as f64).collect();
+                point.velocity = Some(wanted.clone());
+                let passage = pass(&point);
+                assert!(passage.displacement.iter().any(|x| *x > 1e-3) && passage.distance > 0.01);
+                let found = movement(&passage.conditions);
+                let column = if model.kind() == Kind::Discrete { 3 } else { 0 };
+                let off = angle(rotation(found.position.row(k), column), rotation(before.position.row(k + 8), column));
+                assert!(off < 1e-8, "{off:e} rad");
+                for (found, wanted) in found.velocity.row(k).iter().zip(&wanted) {
+                    assert!((found - wanted).abs() < 1e-6, "{frame:?} {factor}: {found} instead of {wanted}");
+                }
+            }
+        }
+    }
+}
+
+/// Under way, the additional forcing alone leads to an orientation with an angular velocity, of a rotation without the rest of a
+/// pose.
+#[test]
+fn angular_velocities_are_passed_under_way() {
+    for model in turning_models() {
+        let conditions = mean(&model).0;
+        let step = duration(&conditions) / STEPS as f64;
+        let column = if model.kind() == Kind::Discrete { 3 } else { 0 };
+        let positions = movement(&model, &conditions, 1);
+        let wanted = [0.3, -0.2, 0.4];
+        let point = ViaPoint {
+            velocity: Some(wanted.to_vec()),
+            dofs: Some((column..column + 4).collect()),
+            ..ViaPoint::new(At::Time(150.0 * step), (0..4).map(|i| positions[[145, column + i]]).collect())
+        };
+        let from_phase = Some(model.canonical().phase(0.3 * model.canonical().extent()));
+        let options = PassageOptions { from_phase, ..PassageOptions::default() };
+        let passage = through(&model, &[point], &conditions, &options).unwrap();
+        assert_eq!(passage.n_constraints, 6);
+        let found = movement(&model, &passage.conditions, 1);
+        let off = angle(rotation(found.row(150), column), rotation(positions.row(145), column));
+        assert!(off < 1e-8, "{off:e} rad");
+        let omega = velocities(&model, &passage.conditions, step, 150);
+        assert!(omega[column..].iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-6), "{omega:?}");
+    }
+}
+
+/// Velocities of another shape, and those of a rotation without its orientation, are refused with the remedy.
+#[test]
+fn angular_velocities_need_an_orientation() {
+    let [model, _] = turning_models();
+    let (conditions, positions) = mean(&model);
+    let at = At::Time(80.0 * duration(&conditions) / STEPS as f64);
+    let point = |position: Option<Vec<f64>>, n: usize, dofs: Option<Vec<usize>>| ViaPoint {
+        position,
+        velocity: Some(vec![0.1; n]),
+        dofs,
+        ..ViaPoint::new(at, vec![])
+    };
+    let position = positions.row(80).to_vec();
+    let rotation = position[3..].to_vec();
+    for (point, text) in [
+        (
+            point(Some(position.clone()), 7, None),
+            "expected 6: one value per DoF of the point, of which a rotation has three",
+        ),
+        (point(Some(rotation), 4, Some(vec![3, 4, 5, 6])), "expected 3"),
+        (point(None, 6, None), "give the point a position, too"),
+    ] {
+        let message = plain(&model, &[point]).unwrap_err().to_string();
+        assert!(message.contains(text), "{message}");
+    }
+    // The velocity of the other coordinates needs no position.
+    let free = plain(&model, &[point(None, 2, Some(vec![0, 2]))]).unwrap();
+    let step = duration(&conditions) / STEPS as f64;
+    let found = velocities(&model, &free.conditions, step, 80);
+    assert!((found[0] - 0.1).abs() < 1e-7 && (found[2] - 0.1).abs() < 1e-7 && free.n_constraints == 2, "{found:?}");
+}
+
+/// Points half a percent of the movement apart with velocities are passed, which takes large weights of opposite sign.
+#[test]
+fn points_close_to_each_other_are_passed() {
+    for (model, deviation) in [(&REACH, 0.03), (&REACH, 1.0), (&CYCLE, 0.0), (&CYCLE, 1.0)] {
+        let (conditions, positions) = mean(model);
+        let step = duration(&conditions) / STEPS as f64;
+        let wanted = |k: usize| -> Vec<f64> { positions.row(k).iter().map(|y| y + 0.01 * (k % 3) as f64).collect() };
+        let point = |k: usize| ViaPoint {
+            velocity: Some(vec![0.1; model.n_dofs()]),
+            ..ViaPoint::new(At::Time(k as f64 * step), wanted(k))
+        };
+        let options = PassageOptions { deviation: Some(deviation), ..PassageOptions::default() };
+        let samples = [60, 61, 90, 120, 121];
+        let passage = through(model, &samples.map(point), &Conditions::default(), &options).unwrap();
+        let found = movement(model, &passage.conditions, 1);
+        for k in samples {
+            for ((found, wanted), range) in found.row(k).iter().zip(wanted(k)).zip(model.ranges()) {
+                assert!((found - wanted).abs() < 1e-9 * range, "{deviation} at {k}: {:e}", found - wanted);
+            }
+        }
+    }
 }
 
 /// Points that no movement passes are refused, with their reason.

@@ -20,10 +20,11 @@ use crate::scalar::{Scalar, optional_number};
 /// phase : float, optional
 ///     Phase x of a discrete movement, in rad of a rhythmic one, as `Controller.phase`.
 /// velocity : array_like, (n,), optional
-///     Velocity per s, one number for each of `dofs`.
+///     Velocity per s, one number for each of `dofs`. A rotation has three in place of its four coordinates: its angular velocity
+///     in rad/s, in the model's `rotation_frame`, at the orientation that `position` gives.
 /// dofs : sequence of int or str, optional
 ///     Indices or names of the n degrees of freedom, or of coordinates if the model has rotations; all by default. A rotation
-///     has all four coordinates or none, and no velocity.
+///     has all four coordinates or none.
 /// tolerance : float
 ///     Standard deviation of the point relative to the range of each degree of freedom; a point with 0 is passed exactly.
 ///

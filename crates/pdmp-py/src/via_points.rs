@@ -156,7 +156,8 @@ impl Model {
     /// ------
     /// ValueError
     ///     There is no point, or one outside of the movement, at a fixed end or before `from_phase`; a length is wrong; a
-    ///     number is not finite; a tolerance or `deviation` is negative; or points contradict each other.
+    ///     number is not finite; a rotation has a velocity without an orientation; a tolerance or `deviation` is negative; or
+    ///     points contradict each other.
     ///
     /// Warns
     /// -----

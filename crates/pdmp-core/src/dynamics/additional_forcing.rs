@@ -94,36 +94,29 @@ impl AdditionalForcing {
         HEADER + MAX_TABLES * (2 + MAX_CELLS * groups(n_dofs) * 6 * WIDTH)
     }
 
-    /// Returns the displacement with given values, slopes and second derivatives with respect to the clock, by knots and DoFs.
+    /// Returns the displacement with given values, slopes and second derivatives with respect to the clock, by knots and groups.
     /// The knots are equidistant from clock `from` to the end of the movement, or over a period.
     ///
     /// The caller ensures that they are zero at both ends of a discrete movement, and equal at both ends of a rhythmic one.
-    pub(crate) fn from_knots(canonical: Canonical, n_dofs: usize, from: f64, knots: &[[f64; 3]]) -> Self {
-        let cells = knots.len() / n_dofs - 1;
-        let mut table = Table::new(canonical, from, cells, Vec::with_capacity(cells * groups(n_dofs)));
+    pub(crate) fn from_knots(canonical: Canonical, n_dofs: usize, from: f64, knots: &[[F64x4; 3]]) -> Self {
+        let n_groups = groups(n_dofs);
+        let cells = knots.len() / n_groups - 1;
+        let mut table = Table::new(canonical, from, cells, Vec::with_capacity(cells * n_groups));
         let h = 1.0 / table.cells_per_clock;
-        for ends in knots.windows(2 * n_dofs).step_by(n_dofs) {
-            for first in (0..n_dofs).step_by(WIDTH) {
-                let lanes = |knot: usize, order: usize| {
-                    let n = WIDTH.min(n_dofs - first);
-                    let values: [f64; WIDTH] =
-                        std::array::from_fn(|i| if i < n { ends[knot * n_dofs + first + i][order] } else { 0.0 });
-                    padded(&values)
-                };
-                let [[value, slope, bend], [end, end_slope, end_bend]] =
-                    [0, 1].map(|knot| [lanes(knot, 0), lanes(knot, 1) * h, lanes(knot, 2) * (0.5 * h * h)]);
-                let rest = end - value - slope - bend;
-                let rest_slope = end_slope - slope - bend * 2.0;
-                let rest_bend = end_bend - bend;
-                table.quintics.push([
-                    value,
-                    slope,
-                    bend,
-                    rest * 10.0 - rest_slope * 4.0 + rest_bend,
-                    rest * -15.0 + rest_slope * 7.0 - rest_bend * 2.0,
-                    rest * 6.0 - rest_slope * 3.0 + rest_bend,
-                ]);
-            }
+        for (start, end) in knots.iter().zip(&knots[n_groups..]) {
+            let [value, slope, bend] = [start[0], start[1] * h, start[2] * (0.5 * h * h)];
+            let [end, end_slope, end_bend] = [end[0], end[1] * h, end[2] * (0.5 * h * h)];
+            let rest = end - value - slope - bend;
+            let rest_slope = end_slope - slope - bend * 2.0;
+            let rest_bend = end_bend - bend;
+            table.quintics.push([
+                value,
+                slope,
+                bend,
+                rest * 10.0 - rest_slope * 4.0 + rest_bend,
+                rest * -15.0 + rest_slope * 7.0 - rest_bend * 2.0,
+                rest * 6.0 - rest_slope * 3.0 + rest_bend,
+            ]);
         }
         Self { canonical, n_dofs, tables: vec![table] }
     }
@@ -272,9 +265,8 @@ mod tests {
     }
 
     fn forcing() -> AdditionalForcing {
-        let knots: Vec<[f64; 3]> = (0..=40)
-            .flat_map(|k| [bump(f64::from(k) * 0.05), [0.0; 3], bump(f64::from(k) * 0.05).map(|x| 2.0 * x)])
-            .collect();
+        let lanes = |x: f64| F64x4::new([x, 0.0, 2.0 * x, 0.0]);
+        let knots: Vec<[F64x4; 3]> = (0..=40).map(|k| bump(f64::from(k) * 0.05).map(lanes)).collect();
         AdditionalForcing::from_knots(DISCRETE, 3, 0.0, &knots)
     }
 
@@ -301,7 +293,7 @@ mod tests {
     #[test]
     fn sums_and_numbers() {
         let forcing = forcing();
-        let other = AdditionalForcing::from_knots(DISCRETE, 3, 1.0, &[[0.0; 3]; 6].map(|x| x));
+        let other = AdditionalForcing::from_knots(DISCRETE, 3, 1.0, &[[F64x4::ZERO; 3]; 6]);
         let sum = forcing.plus(&other).unwrap().plus(&forcing).unwrap();
         assert_eq!(sum.tables.len(), 2);
         assert_relative_eq!(sum.displacement(0.7)[1][2], 2.0 * forcing.displacement(0.7)[1][2], epsilon = 1e-12);

@@ -1,7 +1,8 @@
 //! Scalar constraints of via-points on a movement.
 
-use super::linear_path::LinearPath;
-use super::passage::{Constraint, Constraints, Prior};
+use super::linear_path::Samples;
+use super::passage::{Constraint, Constraints, Jet, Prior};
+use super::residual::Functional;
 use super::via_points::{At, ViaPoint};
 use crate::dynamics::canonical::{Canonical, turn};
 use crate::dynamics::time_warp::WarpingFunction;
@@ -9,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::ResolvedConditions;
 use crate::model::primitive::Primitive;
-use crate::validate::{check_finite, check_length, check_range};
+use crate::validate::{check_range, check_vector};
 
 /// Distance of two places, or of a place from an end, that is rounding.
 const SAME_PLACE: f64 = 1e-9;
@@ -61,84 +62,87 @@ impl Request<'_> {
             let problem = "constrain nothing: give each a position or a velocity of at least one DoF";
             return Err(Error::Argument { name: "points", problem });
         }
-        for (name, vector) in [("position", &point.position), ("velocity", &point.velocity)] {
-            if let Some(vector) = vector {
-                check_length(name, vector.len(), given.len(), "DoF of the point")?;
-                check_finite(name, vector)?;
-            }
+        let dofs = self.primitive.dofs_of(&given);
+        if let Some(position) = &point.position {
+            check_vector("position", position, given.len(), "element of the point's dofs")?;
         }
-        let same = |place: &f64| (place - v).abs() <= SAME_PLACE;
-        let place = constraints.places.iter().position(same).unwrap_or_else(|| {
-            constraints.places.push(v);
-            constraints.places.len() - 1
-        });
-        let dofs = self.of_dofs(point, &given, v)?;
-        for (dof, position, velocity) in dofs {
+        if let Some(velocity) = &point.velocity {
+            check_vector("velocity", velocity, dofs.len(), "DoF of the point, of which a rotation has three")?;
+        }
+        for (dof, position, velocity) in self.of_dofs(point, &given, &dofs, [v, rate])? {
             if let Some(position) = position {
-                self.constrain(constraints, [place, 0, dof], position, point.tolerance)?;
+                let jet = self.jet(constraints, v, 0);
+                self.constrain(constraints, [jet, dof], position, point.tolerance)?;
             }
             if let Some(velocity) = velocity {
-                self.constrain(constraints, [place, 1, dof], velocity / rate, point.tolerance)?;
+                let jet = self.jet(constraints, v, 1);
+                self.constrain(constraints, [jet, dof], velocity / rate, point.tolerance)?;
             }
         }
         Ok(())
     }
 
-    /// Returns DoF, position and velocity of each constraint on a DoF.
-    fn of_dofs(&self, point: &ViaPoint, given: &[usize], v: f64) -> Result<Vec<OfDof>> {
+    /// Returns DoF, position and velocity of each constraint on a DoF, for coordinates with their DoFs.
+    fn of_dofs(&self, point: &ViaPoint, given: &[usize], dofs: &[usize], [v, rate]: [f64; 2]) -> Result<Vec<OfDof>> {
         let at = |vector: &Option<Vec<f64>>, i: usize| vector.as_ref().map(|vector| vector[i]);
         let Some(coordinates) = self.primitive.coordinates() else {
-            return Ok(given
-                .iter()
-                .enumerate()
-                .map(|(i, &d)| (d, at(&point.position, i), at(&point.velocity, i)))
-                .collect());
+            let all = dofs.iter().enumerate();
+            return Ok(all.map(|(i, dof)| (*dof, at(&point.position, i), at(&point.velocity, i))).collect());
         };
-        if point.velocity.is_some() {
-            let problem = "does not apply: a primitive with rotations takes positions of points alone";
-            return Err(Error::Argument { name: "velocity", problem });
-        }
-        // Coordinates that are not given are those of the prior mean.
-        let u = v * self.primitive.canonical().extent();
-        let mean: Vec<f64> = (0..self.scales.len()).map(|dof| self.mean(v, 0, dof)).collect();
-        let mut position = vec![0.0; self.primitive.n_coordinates()];
-        coordinates.to_position(u, &mean, &mut position);
-        for (i, &coordinate) in given.iter().enumerate() {
-            position[coordinate] = at(&point.position, i).unwrap_or(position[coordinate]);
-        }
-        coordinates.check("position", &position)?;
-        let mut dofs = vec![0.0; self.scales.len()];
-        coordinates.to_dofs(u, &position, Some(&mean), &mut dofs);
-        let mut constrained = vec![];
         for rotation in coordinates.rotations() {
             let columns = rotation.columns.column..rotation.columns.column + 4;
             match columns.filter(|column| given.contains(column)).count() {
                 0 => {}
-                4 => constrained.extend(rotation.dof..rotation.dof + 3),
+                4 if point.position.is_none() => {
+                    let problem = "of a rotation depends on its orientation: give the point a position, too, or leave the \
+                                   rotation out of dofs";
+                    return Err(Error::Argument { name: "velocity", problem });
+                }
+                4 => {}
                 _ => {
                     let problem = "have a part of a quaternion: give all four of its coordinates or none";
                     return Err(Error::Argument { name: "dofs", problem });
                 }
             }
         }
-        constrained
-            .extend(coordinates.plain().iter().filter(|[column, _]| given.contains(column)).map(|[_, dof]| *dof));
-        Ok(constrained.into_iter().map(|dof| (dof, Some(dofs[dof]), None)).collect())
+        // Coordinates that are not given are those of the prior mean.
+        let extent = self.canonical().extent();
+        let u = v * extent;
+        let mean = self.jet_at(Functional { place: v, order: 0 }).mean;
+        let mut position = vec![0.0; self.primitive.n_coordinates()];
+        coordinates.to_position(u, &mean, &mut position);
+        for (i, &coordinate) in given.iter().enumerate() {
+            position[coordinate] = at(&point.position, i).unwrap_or(position[coordinate]);
+        }
+        coordinates.check("position", &position)?;
+        let (mut places, mut velocities) = (vec![0.0; self.scales.len()], vec![0.0; self.scales.len()]);
+        coordinates.to_dofs(u, &position, Some(&mean), &mut places);
+        if let Some(velocity) = &point.velocity {
+            dofs.iter().zip(velocity).for_each(|(dof, x)| velocities[*dof] = *x);
+            coordinates.relative_velocity(u, &places, &mut velocities);
+            coordinates.for_each_drift(u, &places, |dof, drift| {
+                drift.iter().enumerate().for_each(|(i, drift)| velocities[dof + i] -= drift * rate * extent);
+            });
+        }
+        let of = |vector: &Option<Vec<f64>>, values: &[f64], dof: usize| vector.as_ref().map(|_| values[dof]);
+        Ok(dofs
+            .iter()
+            .map(|&dof| (dof, of(&point.position, &places, dof), of(&point.velocity, &velocities, dof)))
+            .collect())
     }
 
     /// Adds the constraint that a derivative of a DoF has a value.
     fn constrain(
         &self,
         constraints: &mut Constraints,
-        [place, order, dof]: [usize; 3],
+        [jet, dof]: [usize; 2],
         value: f64,
         tolerance: f64,
     ) -> Result<()> {
-        let v = constraints.places[place];
-        let row = self.row(v, order, dof).0;
-        let residual = value - self.mean(v, order, dof);
+        let Jet { functional: Functional { place: v, order }, rows, mean } = &constraints.jets[jet];
+        let residual = value - mean[dof];
         let scale = self.scales[dof];
-        let repeated = |other: &&Constraint| (other.place, other.order, other.dof) == (place, order, dof);
+        let repeated = |other: &&Constraint| (other.jet, other.dof) == (jet, dof);
         if let Some(other) = constraints.rows.iter().find(repeated)
             && tolerance == 0.0
             && other.tolerance == 0.0
@@ -149,81 +153,65 @@ impl Request<'_> {
             let problem = "differ at one place: leave one out, or give them a tolerance";
             return Err(Error::Argument { name: "points", problem });
         }
-        let is_end = v <= SAME_PLACE || v >= 1.0 - SAME_PLACE;
-        if self.prior.canonical.kind() == Kind::Discrete && is_end && (order > 0 || self.is_fixed(&row, scale)) {
+        let is_end = *v <= SAME_PLACE || *v >= 1.0 - SAME_PLACE;
+        if self.canonical().kind() == Kind::Discrete && is_end && (*order > 0 || self.is_fixed(rows, dof)) {
             let problem = "constrain an end of the movement, which the conditions fix: change start, goal, velocity or \
                            goal_velocity instead";
             return Err(Error::Argument { name: "points", problem });
         }
-        constraints.rows.push(Constraint { place, order, dof, row, residual, tolerance: tolerance * scale, scale });
+        constraints.rows.push(Constraint { jet, dof, residual, tolerance: tolerance * scale, scale });
         Ok(())
     }
 
-    /// Returns whether the parameters do not change aᵀθ.
-    fn is_fixed(&self, row: &[f64], scale: f64) -> bool {
-        let covariance = &self.prior.covariance;
-        let variance: f64 =
-            (0..row.len()).map(|p| row[p] * (0..row.len()).map(|q| covariance[(p, q)] * row[q]).sum::<f64>()).sum();
-        self.from.is_some() || variance <= (FIXED * scale).powi(2)
+    /// Returns whether the parameters do not change a DoF, with coefficients (width, D) of all of them.
+    fn is_fixed(&self, rows: &[f64], dof: usize) -> bool {
+        let (path, covariance) = (self.prior.path, &self.prior.covariance);
+        let row = || (0..path.width()).map(|c| (path.parameter(c, dof), rows[c * self.scales.len() + dof]));
+        let variance: f64 = row().map(|(p, a)| row().map(|(q, b)| a * covariance[(p, q)] * b).sum::<f64>()).sum();
+        self.from.is_some() || variance <= (FIXED * self.scales[dof]).powi(2)
     }
 
-    /// Adds the constraints that the displacement and two derivatives vanish where it begins and ends.
-    pub(super) fn add_ends(&self, constraints: &mut Constraints) {
-        let discrete = matches!(self.prior.canonical, Canonical::Discrete { .. });
-        let mut ends = Vec::new();
-        if discrete || self.from.is_some() {
-            ends.push(self.from.unwrap_or(0.0));
-        }
-        if discrete {
-            ends.push(1.0);
-        }
-        for v in ends {
-            let place = constraints.places.len();
-            constraints.places.push(v);
-            for dof in 0..self.scales.len() {
-                for order in 0..3 {
-                    let mut row = vec![0.0; self.parameters.len()];
-                    if self.from.is_some() {
-                        row = self.row(v, order, dof).0;
-                    }
-                    let scale = self.scales[dof];
-                    constraints.rows.push(Constraint { place, order, dof, row, residual: 0.0, tolerance: 0.0, scale });
-                }
-            }
-        }
+    fn canonical(&self) -> Canonical {
+        self.primitive.canonical()
     }
 
-    /// Returns a and c of a derivative of a DoF.
-    fn row(&self, v: f64, order: usize, dof: usize) -> (Vec<f64>, f64) {
-        let mut row = vec![0.0; self.parameters.len()];
-        let constant = self.prior.path.row(&LinearPath::place(v, order), order, dof, &mut row);
-        (row, constant)
+    /// Returns the index of a derivative at a place, which is added if it is not there.
+    fn jet(&self, constraints: &mut Constraints, v: f64, order: usize) -> usize {
+        let jets = &mut constraints.jets;
+        let there = jets.iter().find(|jet| (jet.functional.place - v).abs() <= SAME_PLACE);
+        let place = there.map_or(v, |jet| jet.functional.place);
+        let same = |jet: &Jet| jet.functional.place == place && jet.functional.order == order;
+        jets.iter().position(same).unwrap_or_else(|| {
+            jets.push(self.jet_at(Functional { place, order }));
+            jets.len() - 1
+        })
     }
 
-    /// Returns a derivative of a DoF under the conditions.
-    fn mean(&self, v: f64, order: usize, dof: usize) -> f64 {
-        let (row, constant) = self.row(v, order, dof);
-        let extent = self.prior.canonical.extent();
-        let displaced = self
-            .conditions
-            .forcing
-            .as_ref()
-            .map_or(0.0, |forcing| forcing.displacement(v * extent)[order][dof] * extent.powi(order as i32));
-        constant + displaced + row.iter().zip(&self.parameters).map(|(a, b)| a * b).sum::<f64>()
+    /// Returns a derivative of the movement under the conditions.
+    fn jet_at(&self, functional: Functional) -> Jet {
+        let (path, extent) = (self.prior.path, self.canonical().extent());
+        let Functional { place, order } = functional;
+        let (rows, mut mean) = path.rows(&Samples::at(place, order));
+        path.products(&rows, &self.parameters, &mut mean);
+        if let Some(forcing) = &self.conditions.forcing {
+            let displacement = &forcing.displacement(place * extent)[order];
+            mean.iter_mut().zip(displacement).for_each(|(mean, x)| *mean += x * extent.powi(order as i32));
+        }
+        Jet { functional, rows, mean }
     }
 
     /// Returns the place v of a point and dv/dt there.
     fn place(&self, at: At) -> Result<[f64; 2]> {
-        let kind = self.prior.canonical.kind();
+        let kind = self.canonical().kind();
         let v = match at {
             At::Time(time) => {
                 let last = if kind == Kind::Discrete { self.time.duration() * (1.0 + SAME_PLACE) } else { f64::MAX };
                 let allowed =
                     "seconds must lie between the start and the end of the movement; see tau and segment_durations";
                 check_range("time", time, (0.0..=last).contains(&time), allowed)?;
-                self.time.phase(time)[0] + self.conditions.phase / self.prior.canonical.extent()
+                self.time.phase(time)[0] + self.conditions.phase / self.canonical().extent()
             }
-            At::Phase(phase) => share_at(self.prior.canonical, "phase", phase)?,
+            At::Phase(phase) => share_at(self.canonical(), "phase", phase)?,
         };
         let v = if kind == Kind::Discrete { v.min(1.0) } else { v.rem_euclid(1.0) };
         if let (Kind::Discrete, Some(from)) = (kind, self.from)

@@ -19,6 +19,7 @@ mod passage;
 mod pauses;
 pub(crate) mod prior;
 pub(crate) mod recogniser;
+mod residual;
 mod rotations;
 mod triangle;
 mod via_points;

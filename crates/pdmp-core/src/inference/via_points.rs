@@ -6,8 +6,9 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::constraints::{Request, share_at};
-use super::linear_path::LinearPath;
-use super::passage::{CELLS, Passed, Prior};
+use super::linear_path::{LinearPath, path_responses};
+use super::passage::{Passed, Prior};
+use super::residual::{CELLS, Residual};
 use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::dynamics::time_warp::WarpingFunction;
 use crate::error::{Error, Result};
@@ -16,7 +17,7 @@ use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::model::{Model, Prediction};
 use crate::motion::perturbation::{MIN_RANGE_RATIO, largest_range};
-use crate::numerics::matern::Matern52;
+use crate::numerics::simd::{F64x4, groups, unpack};
 use crate::validate::check_range;
 
 /// Default standard deviation of what the styles leave of a movement, relative to the range. Geometric mean over eight sets of
@@ -57,7 +58,8 @@ pub struct ViaPoint {
     pub at: At,
     /// Position, one number for each of `dofs`; none for a velocity alone.
     pub position: Option<Vec<f64>>,
-    /// Velocity per second, one number for each of `dofs`.
+    /// Velocity per second, one number for each of `dofs`. A rotation has three in place of its four coordinates: its angular
+    /// velocity in rad/s, in the frame of the model ([`crate::model::Frame`]), at the orientation that `position` gives.
     pub velocity: Option<Vec<f64>>,
     /// Indices of the DoFs, or of the coordinates of a primitive with rotations; all of them if none are given.
     pub dofs: Option<Vec<usize>>,
@@ -140,8 +142,9 @@ impl Passage {
 /// ```
 ///
 /// # Errors
-/// No point; one outside of the movement or before `from_phase`; a vector of a wrong length or a number that is not finite; a
-/// negative tolerance or deviation; points that contradict each other or the given conditions; more than 500 numbers.
+/// No point; one outside of the movement or before `from_phase`; a vector of a wrong length or a number that is not finite; the
+/// velocity of a rotation without its orientation; a negative tolerance or deviation; points that contradict each other or the
+/// given conditions; more than 500 numbers.
 pub fn through(
     model: &Model,
     points: &[ViaPoint],
@@ -154,35 +157,37 @@ pub fn through(
     let base = conditions.clone().or(mean(model, options)?);
     let resolved = base.complete(primitive)?;
     let time = time_of(inside, &base)?;
-    let [start_slope, end_slope] = end_slopes(&resolved, &time);
-    let path = LinearPath::new(inside, &resolved, start_slope, end_slope)?;
+    let responses = path_responses(inside, resolved.has_goal_velocity)?;
+    let path = LinearPath::new(inside, &resolved, end_slopes(&resolved, &time), &responses);
     let deviation = options.deviation.unwrap_or(DEVIATION);
     let allowed = "must be a share of the range, from 0 to 1000";
     check_range("deviation", deviation, (0.0..=1e3).contains(&deviation), allowed)?;
     let smallest = MIN_RANGE_RATIO * largest_range(inside.ranges());
     let scales: Vec<f64> = inside.ranges().iter().map(|range| range.max(smallest)).collect();
     let discrete = inside.kind() == Kind::Discrete;
+    let from = options.from_phase.map(|phase| share_at(canonical, "from_phase", phase)).transpose()?;
+    let late = Error::Argument { name: "from_phase", problem: "is the end of the movement: choose an earlier one" };
+    let covariance = covariance(model, path.n_parameters(), conditions, options);
     let prior = Prior {
         path: &path,
-        covariance: covariance(model, &path, conditions, options),
-        kernel: if discrete { Matern52::on_line(LENGTH) } else { Matern52::on_circle(LENGTH) },
+        carries: from.is_some() && covariance.iter().any(|x| *x != 0.0),
+        covariance,
+        residual: Residual::new(canonical, LENGTH, from).ok_or(late)?,
         variances: scales.iter().map(|scale| (scale * deviation.max(MIN_DEVIATION)).powi(2)).collect(),
-        canonical,
+        extent: canonical.extent(),
     };
-    let from = options.from_phase.map(|phase| share_at(canonical, "from_phase", phase)).transpose()?;
     let parameters = [&resolved.style, &resolved.centre].into_iter().chain(resolved.start.iter().filter(|_| discrete));
     let parameters: Vec<f64> = parameters.flatten().copied().collect();
     let request =
         Request { primitive, conditions: &resolved, prior: &prior, scales: &scales, time: &time, from, parameters };
-    let mut constraints = request.constraints(points)?;
+    let constraints = request.constraints(points)?;
     let n_constraints = constraints.rows.len();
     if n_constraints == 0 {
         return Err(Error::Argument { name: "points", problem: "are empty: pass at least one" });
     }
     let allowed = "must be at most 500: pass fewer points";
     check_range("number of constraints", n_constraints as f64, n_constraints <= MAX_CONSTRAINTS, allowed)?;
-    request.add_ends(&mut constraints);
-    let passed = prior.pass(&constraints, from.unwrap_or(0.0), from.is_some());
+    let passed = prior.pass(&constraints);
     let passed = passed.filter(|passed| passed.error <= MAX_ERROR && passed.distance.is_finite());
     let Some(Passed { change, forcing, distance, .. }) = passed else {
         let problem = "contradict each other or the conditions: no movement passes all of them; give them a tolerance, or \
@@ -204,7 +209,7 @@ pub fn through(
 fn mean(model: &Model, options: &PassageOptions) -> Result<Conditions> {
     match &options.prediction {
         Some(prediction) => Ok(prediction.conditions.clone()),
-        None => model.conditions(&(0..model.n_demos()).collect::<Vec<_>>()),
+        None => model.mean(),
     }
 }
 
@@ -228,43 +233,29 @@ fn end_slopes(conditions: &ResolvedConditions, time: &WarpingFunction) -> [Optio
 }
 
 /// Returns the covariance (P, P) of the parameters, zero for those that are given.
-fn covariance(model: &Model, path: &LinearPath, given: &Conditions, options: &PassageOptions) -> DMatrix<f64> {
-    let (n, n_styles, n_dofs) = (path.n_parameters(), model.n_styles(), model.primitive().inside().n_dofs());
-    let discrete = model.kind() == Kind::Discrete;
+fn covariance(model: &Model, n: usize, given: &Conditions, options: &PassageOptions) -> DMatrix<f64> {
+    let (n_styles, n_dofs) = (model.n_styles(), model.primitive().inside().n_dofs());
     let is_given = |p: usize| match p {
         p if p < n_styles => given.style.is_some(),
         p if p < n_styles + n_dofs => given.goal.is_some() || given.anchor.is_some(),
         _ => given.start.is_some(),
     };
     let predicted = options.prediction.as_ref().and_then(|prediction| prediction.covariance.as_ref());
-    let covariance = match predicted {
-        Some(covariance) => DMatrix::from_fn(n, n, |p, q| covariance[[p, q]]),
-        None => {
-            let demonstrated = model.demonstrated();
-            let (m, centres) = (model.n_demos(), if discrete { &demonstrated.goals } else { &demonstrated.anchors });
-            let deviations = DMatrix::from_fn(m, n, |i, p| match p {
-                p if p < n_styles => demonstrated.styles[[i, p]],
-                p if p < n_styles + n_dofs => centres[[i, p - n_styles]],
-                _ => demonstrated.starts[[i, p - n_styles - n_dofs]],
-            });
-            let mean = deviations.row_mean();
-            let deviations = DMatrix::from_fn(m, n, |i, p| deviations[(i, p)] - mean[p]);
-            deviations.tr_mul(&deviations) / (m.max(2) - 1) as f64
-        }
-    };
-    DMatrix::from_fn(n, n, |p, q| if is_given(p) || is_given(q) { 0.0 } else { covariance[(p, q)] })
+    let covariance = predicted.unwrap_or_else(|| model.covariance());
+    let given: Vec<bool> = (0..n).map(is_given).collect();
+    DMatrix::from_fn(n, n, |p, q| if given[p] || given[q] { 0.0 } else { covariance[[p, q]] })
 }
 
 /// Returns the largest displacement of each DoF (D,) relative to its range, at the knots.
 fn largest(forcing: &AdditionalForcing, scales: &[f64], extent: f64) -> Vec<f64> {
-    let mut largest = vec![0.0f64; scales.len()];
-    for k in 0..CELLS {
-        let [displacement, ..] = forcing.displacement(extent * (k as f64 / CELLS as f64));
-        for (largest, (x, scale)) in largest.iter_mut().zip(displacement.iter().zip(scales)) {
-            *largest = largest.max(x.abs() / scale);
+    let mut largest = vec![F64x4::ZERO; groups(scales.len())];
+    for (group, largest) in largest.iter_mut().enumerate() {
+        for k in 0..CELLS {
+            let value = forcing.sample::<F64x4>(group, extent * (k as f64 / CELLS as f64)).value;
+            *largest = largest.fast_max(value.abs());
         }
     }
-    largest
+    unpack(&largest, scales.len()).iter().zip(scales).map(|(largest, scale)| largest / scale).collect()
 }
 
 /// Returns conditions with changed parameters.

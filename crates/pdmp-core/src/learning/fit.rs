@@ -17,7 +17,7 @@ use crate::learning::style_selection::cross_validation::StyleSelection;
 use crate::learning::targets::Targets;
 use crate::model::primitive::Primitive;
 use crate::model::template::WarpTemplate;
-use crate::model::{DemonstrationParameters, FitSummary, Model};
+use crate::model::{DemonstrationParameters, FitSummary, Model, Moments};
 use crate::preprocessing::inspection::{cycle_ends, inspect, unwound};
 use crate::validate::{check_length, check_names};
 
@@ -199,7 +199,7 @@ pub fn fit_with(
         Some(residuals) => residuals.outside(primitive, options.frame),
         None => primitive,
     };
-    Ok(Model { primitive, demonstrated, learnt, map })
+    Ok(Model { primitive, demonstrated, learnt, map, moments: Moments::default() })
 }
 
 /// Learns the map from the contexts of the demonstrations to their movements.

@@ -48,6 +48,24 @@ impl Primitive {
         self.coordinates.as_ref().map_or(&self.names, |coordinates| coordinates.names())
     }
 
+    /// Returns the DoFs of some coordinates in their order, all three of a rotation in place of the first of its coordinates.
+    pub fn dofs_of(&self, coordinates: &[usize]) -> Vec<usize> {
+        let Some(all) = &self.coordinates else { return coordinates.to_vec() };
+        let (mut dofs, mut done) = (Vec::new(), Vec::new());
+        for column in coordinates {
+            let owns = |first: usize| (first..first + 4).contains(column);
+            match all.rotations().iter().find(|rotation| owns(rotation.columns.column)) {
+                Some(rotation) if done.contains(&rotation.dof) => {}
+                Some(rotation) => {
+                    done.push(rotation.dof);
+                    dofs.extend(rotation.dof..rotation.dof + 3);
+                }
+                None => dofs.extend(all.plain().iter().filter(|[own, _]| own == column).map(|[_, dof]| *dof)),
+            }
+        }
+        dofs
+    }
+
     /// Returns the units of the coordinates; an unknown unit is "".
     pub fn coordinate_units(&self) -> &[String] {
         self.coordinates.as_ref().map_or(&self.units, |coordinates| coordinates.units())

@@ -5,6 +5,7 @@ pub(crate) mod coordinates;
 pub(crate) mod file;
 pub(crate) mod finding;
 mod inside;
+mod moments;
 pub(crate) mod prediction;
 pub(crate) mod primitive;
 pub(crate) mod responses;
@@ -26,6 +27,7 @@ use crate::numerics::smoothing_spline::Noise;
 pub use conditions::Conditions;
 pub use coordinates::{Coordinates, Frame};
 pub use finding::Finding;
+pub(crate) use moments::Moments;
 pub use prediction::Prediction;
 use primitive::Nominal;
 pub use primitive::Primitive;
@@ -110,6 +112,7 @@ pub struct Model {
     pub(crate) demonstrated: DemonstrationParameters,
     pub(crate) learnt: FitSummary,
     pub(crate) map: Option<ContextMap>,
+    pub(crate) moments: Moments,
 }
 
 impl Deref for Model {
@@ -160,6 +163,11 @@ impl Model {
     /// # Errors
     /// No demonstration, or an index that is not below their number.
     pub fn conditions(&self, demonstrations: &[usize]) -> Result<Conditions> {
+        self.conditions_inside(demonstrations).map(|conditions| self.outside(conditions))
+    }
+
+    /// Returns the conditions of the degrees of freedom of demonstrations.
+    fn conditions_inside(&self, demonstrations: &[usize]) -> Result<Conditions> {
         let allowed = "must be below the number of demonstrations";
         if let Some(&m) = demonstrations.iter().find(|m| **m >= self.n_demos()) {
             return Err(Error::Range { name: "demonstration", value: m as f64, allowed });
@@ -177,7 +185,7 @@ impl Model {
             Kind::Rhythmic => (None, None, mean(anchors)),
         };
         let (style, segment_durations) = (mean(styles), mean(segment_durations));
-        Ok(self.outside(Conditions { style, goal, start, anchor, segment_durations, ..Conditions::default() }))
+        Ok(Conditions { style, goal, start, anchor, segment_durations, ..Conditions::default() })
     }
 
     /// Converts conditions of the degrees of freedom to those of the coordinates.

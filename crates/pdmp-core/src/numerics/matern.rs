@@ -7,52 +7,80 @@
 //! A process y with this covariance is twice differentiable, and cov(y⁽ⁱ⁾(v), y⁽ʲ⁾(w)) = (−1)ʲ k⁽ⁱ⁺ʲ⁾(v − w) for i, j ≤ 2. On a
 //! circle of circumference 1, k is the sum over all images, divided by its value at r = 0.
 
-/// Scaled distance from which exp(−a) vanishes in rounding.
-const MAX_DISTANCE: f64 = 40.0;
+/// Coefficients of 1, a and a² in k⁽ⁱ⁾/λⁱ = (α + βa + γa²)·exp(−a) for r > 0 and i = 0, …, 4.
+const POLYNOMIALS: [[f64; 3]; 5] = [
+    [1.0, 1.0, 1.0 / 3.0],
+    [0.0, -1.0 / 3.0, -1.0 / 3.0],
+    [-1.0 / 3.0, -1.0 / 3.0, 1.0 / 3.0],
+    [0.0, 1.0, -1.0 / 3.0],
+    [1.0, -5.0 / 3.0, 1.0 / 3.0],
+];
 
 /// Covariance function of unit variance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Matern52 {
     /// λ = √5/ℓ.
     rate: f64,
-    /// Number of images on either side; 0 on a line.
-    images: i32,
-    scale: f64,
+    is_circle: bool,
+    /// Coefficients of 1, a and a² in the derivatives, of the sum over all images on one side on a circle.
+    polynomials: [[f64; 3]; 5],
 }
 
 impl Matern52 {
     /// Returns the function of length scale ℓ on a line.
     pub(crate) fn on_line(length: f64) -> Self {
-        Self { rate: 5f64.sqrt() / length, images: 0, scale: 1.0 }
+        let rate = 5f64.sqrt() / length;
+        Self { rate, is_circle: false, polynomials: scaled(POLYNOMIALS, rate, 1.0) }
     }
 
     /// Returns the function of length scale ℓ on a circle of circumference 1.
+    ///
+    /// With q = exp(−λ), the images at a + mλ on one side add up to geometric sums:
+    /// Σ qᵐ = 1/(1 − q), Σ mqᵐ = q/(1 − q)² and Σ m²qᵐ = q(1 + q)/(1 − q)³.
     pub(crate) fn on_circle(length: f64) -> Self {
         let rate = 5f64.sqrt() / length;
-        let plain = Self { rate, images: (MAX_DISTANCE / rate).ceil() as i32 + 1, scale: 1.0 };
-        Self { scale: 1.0 / plain.derivatives(0.0)[0], ..plain }
+        let (q, rest) = ((-rate).exp(), -(-rate).exp_m1());
+        let (zeroth, first, second) = (rest.recip(), q / (rest * rest), q * (1.0 + q) / (rest * rest * rest));
+        let sides = POLYNOMIALS.map(|[alpha, beta, gamma]| {
+            let constant = alpha * zeroth + beta * rate * first + gamma * rate * rate * second;
+            [constant, beta * zeroth + 2.0 * gamma * rate * first, gamma * zeroth]
+        });
+        let plain = Self { rate, is_circle: true, polynomials: sides };
+        Self { polynomials: scaled(sides, rate, plain.derivatives(0.0)[0].recip()), ..plain }
     }
 
-    /// Returns k, k′, …, k⁗ at `r`, on a circle at |r| < 1.
+    /// Returns k, k′, …, k⁗ at `r`.
+    #[inline]
     pub(crate) fn derivatives(&self, r: f64) -> [f64; 5] {
-        let mut sum = [0.0; 5];
-        for image in -self.images..=self.images {
-            let r = r + f64::from(image);
-            let a = self.rate * r.abs();
-            if a > MAX_DISTANCE {
-                continue;
-            }
-            let third = (-a).exp() * self.scale / 3.0;
-            let odd = self.rate * third * r.signum();
-            let even = self.rate * self.rate * third;
-            sum[0] += third * (3.0 + a * (3.0 + a));
-            sum[1] -= odd * a * (1.0 + a);
-            sum[2] -= even * (1.0 + a - a * a);
-            sum[3] += odd * self.rate * self.rate * a * (3.0 - a);
-            sum[4] += even * self.rate * self.rate * (3.0 - a * (5.0 - a));
+        if !self.is_circle {
+            return self.side(r.abs(), if r < 0.0 { -1.0 } else { 1.0 });
         }
-        sum
+        let r = r - r.floor();
+        let (mut derivatives, behind) = (self.side(r, 1.0), self.side(1.0 - r, -1.0));
+        derivatives.iter_mut().zip(behind).for_each(|(ahead, behind)| *ahead += behind);
+        derivatives
     }
+
+    /// Returns the derivatives at a distance on one side; odd ones have its sign.
+    #[inline(always)]
+    fn side(&self, distance: f64, sign: f64) -> [f64; 5] {
+        let a = self.rate * distance;
+        let decay = (-a).exp();
+        let (odd, mut derivatives) = (sign * decay, [decay; 5]);
+        (derivatives[1], derivatives[3]) = (odd, odd);
+        for (derivative, [alpha, beta, gamma]) in derivatives.iter_mut().zip(&self.polynomials) {
+            *derivative *= alpha + a * (beta + a * gamma);
+        }
+        derivatives
+    }
+}
+
+/// Returns the polynomials of the derivatives with respect to r, multiplied by a number.
+fn scaled(mut polynomials: [[f64; 3]; 5], rate: f64, scale: f64) -> [[f64; 3]; 5] {
+    for (i, polynomial) in polynomials.iter_mut().enumerate() {
+        *polynomial = polynomial.map(|x| x * rate.powi(i as i32) * scale);
+    }
+    polynomials
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use crate::learning::options::{CanonicalOptions, FitOptions, NStyles, Stage, Tra
 use crate::learning::stiffness::stiffness;
 use crate::learning::style_selection::singular_values::{Recorded, noise_limit, squares_are_regressors, systematic};
 use crate::learning::targets::lag_target;
-use crate::model::{DemonstrationParameters, Finding, FitSummary, Model};
+use crate::model::{DemonstrationParameters, Finding, FitSummary, Model, Moments};
 use crate::numerics::orthonormal_span::OrthonormalSpan;
 
 /// Factorised targets of a [`PartialFit`], which await the styles of its demonstrations.
@@ -318,7 +318,7 @@ impl FactorisedFit {
             regression,
             findings,
         };
-        Ok(Model { primitive, demonstrated, learnt, map })
+        Ok(Model { primitive, demonstrated, learnt, map, moments: Moments::default() })
     }
 }
 

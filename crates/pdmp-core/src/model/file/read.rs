@@ -22,7 +22,7 @@ use crate::model::conditions::MAX_STYLE_MAGNITUDE;
 use crate::model::primitive::{MAX_RATE, MAX_TAU, Parts, Primitive};
 use crate::model::sensitivity::STEPS;
 use crate::model::template::{TimeWarp, WarpTemplate};
-use crate::model::{Coordinates, DemonstrationParameters, FitSummary, Model};
+use crate::model::{Coordinates, DemonstrationParameters, FitSummary, Model, Moments};
 use crate::numerics::smoothing_spline::Noise;
 use crate::validate::MAX_MAGNITUDE;
 
@@ -202,7 +202,7 @@ impl Reader<'_> {
             Some(layout) => self.coordinates(layout, primitive)?,
             None => Arc::new(primitive),
         };
-        Ok(Model { primitive, demonstrated, learnt, map })
+        Ok(Model { primitive, demonstrated, learnt, map, moments: Moments::default() })
     }
 
     /// Returns a primitive with the coordinates of the file.
