@@ -21,6 +21,7 @@ pub(crate) mod stopping;
 pub(crate) mod superposition;
 pub(crate) mod time_law;
 pub(crate) mod trajectory;
+mod transposed_rollout;
 mod two_arms;
 pub(crate) mod unit_responses;
 mod vector_jacobian;

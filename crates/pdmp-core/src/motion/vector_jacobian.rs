@@ -10,6 +10,8 @@
 //! ```
 //!
 //! with the unit responses of `unit_responses`. The loops are those of `superposition`, transposed: no Jacobian is formed.
+//! Movements that differ in τ, in phase or in segment durations have no responses in common; the products of each are those of
+//! `transposed_rollout`.
 
 use std::ops::Range;
 
@@ -19,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::model::responses::Derivative;
 use crate::motion::batch::{BLOCK, Batch, MIN_MOVEMENTS_PER_BLOCK, PROGRESS_INTERVAL};
 use crate::motion::batch_conditions::PerMovement;
+use crate::motion::batch_singles::Singles;
 use crate::motion::jacobian::WithRespectTo;
 use crate::motion::superposition::{Combination, Tile, tile_size};
 use crate::numerics::threads::Threads;
@@ -63,8 +66,8 @@ impl Batch {
     ///
     /// # Errors
     /// A range beyond the batch; cotangents of another number or shape, or that are not finite; a variable of the other
-    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations; movements without
-    /// response curves in common; a primitive with rotations; or the error of `progress`.
+    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations or segment durations; a
+    /// primitive with rotations; or the error of `progress`.
     pub fn vector_jacobian(
         &self,
         movements: Range<usize>,
@@ -101,7 +104,11 @@ impl Batch {
             threads.try_for_each(next, |(first, mut outputs)| {
                 let at = first..(first + in_block).min(movements.len());
                 let cotangents: Vec<_> = cotangents.iter().map(|array| array.slice(s![at.clone(), .., ..])).collect();
-                for (i, product) in work.block(movements.start + first, &cotangents).iter().enumerate() {
+                let products = match &self.singles {
+                    Some(singles) => singles.products(movements.start + first, &cotangents, by_tau)?,
+                    None => work.block(movements.start + first, &cotangents),
+                };
+                for (i, product) in products.iter().enumerate() {
                     for (variable, output) in variables.iter().zip(&mut outputs) {
                         self.write_gradient(movements.start + first + i, *variable, product, output.row_mut(i))?;
                     }
@@ -123,9 +130,6 @@ impl Batch {
     ) -> Result<()> {
         let (n_movements, n_samples, n_dofs) = self.shape();
         let wrong = |name, problem| Err(Error::Argument { name, problem });
-        if self.singles.is_some() {
-            return wrong("conditions", "must have one tau, linear time and phase 0 in common: call once for each tau");
-        }
         if self.pose.is_some() {
             return wrong("cotangents", "do not apply to a model with rotations: pass its Jacobians to your framework");
         }
@@ -139,6 +143,9 @@ impl Batch {
         }
         for variable in variables {
             variable.check(self.kind, Derivative::ALL[cotangents.len() - 1])?;
+            if *variable == WithRespectTo::Tau && self.singles.as_ref().is_some_and(Singles::is_warped) {
+                return wrong("tau", "does not apply to movements that follow segment_durations: pass tau in their place");
+            }
             let (name, given) = match variable {
                 WithRespectTo::Start => ("start", self.starts.is_some()),
                 WithRespectTo::Velocity => ("velocity", self.velocities.is_some()),
@@ -167,7 +174,8 @@ impl Batch {
                 (self.starts.is_some(), Derivative::Position, start),
                 (self.velocities.is_some(), Derivative::Velocity, velocity),
             ] {
-                if given {
+                // The products of movements of a timing of their own are net of both.
+                if given && self.singles.is_none() {
                     let at_start = self.responses.of(derivative).styles[j].row(0);
                     sum -= at_start.iter().zip(products).fold(0.0, |sum, (r, product)| sum + r * product);
                 }
@@ -193,7 +201,8 @@ impl Batch {
             WithRespectTo::GoalVelocity => gradient.assign(&aview1(goal_velocity)),
             WithRespectTo::Tau => {
                 let given = dot(&self.velocities, velocity) + dot(&self.goal_velocities, goal_velocity);
-                gradient[0] = (given - product.scaled_time) / self.tau;
+                let tau = self.singles.as_ref().map_or(self.tau, |singles| singles.tau(b));
+                gradient[0] = (given - product.scaled_time) / tau;
             }
         }
         if gradient.iter().all(|value| value.is_finite()) {
@@ -206,20 +215,20 @@ impl Batch {
 
 /// Inner products ⟨v, ·⟩ of the cotangents of one movement with the unit responses.
 #[derive(Clone, Debug)]
-struct Product {
+pub(super) struct Product {
     /// Those with the styles (J,), summed over the DoFs.
-    styles: Vec<f64>,
+    pub(super) styles: Vec<f64>,
     /// c, e, n and q (D,); in sums over tiles, of each coefficient of a [`Combination`].
-    centre: Vec<f64>,
-    start: Vec<f64>,
-    velocity: Vec<f64>,
-    goal_velocity: Vec<f64>,
+    pub(super) centre: Vec<f64>,
+    pub(super) start: Vec<f64>,
+    pub(super) velocity: Vec<f64>,
+    pub(super) goal_velocity: Vec<f64>,
     /// Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ + Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩, if τ is a variable.
-    scaled_time: f64,
+    pub(super) scaled_time: f64,
 }
 
 impl Product {
-    fn zeros(n_styles: usize, n: usize) -> Self {
+    pub(super) fn zeros(n_styles: usize, n: usize) -> Self {
         let [centre, start, velocity, goal_velocity] = [(); 4].map(|()| vec![0.0; n]);
         Self { styles: vec![0.0; n_styles], centre, start, velocity, goal_velocity, scaled_time: 0.0 }
     }
@@ -298,7 +307,7 @@ fn dots<const N: usize>(curves: [&[f64]; N], v: &[f64]) -> [f64; N] {
     std::array::from_fn(|j| (whole..v.len()).fold(sums[j].iter().sum(), |sum, i| sum + curves[j][i] * v[i]))
 }
 
-fn dot(curve: &[f64], v: &[f64]) -> f64 {
+pub(super) fn dot(curve: &[f64], v: &[f64]) -> f64 {
     let [product] = dots([curve], v);
     product
 }

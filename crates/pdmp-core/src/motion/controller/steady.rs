@@ -8,7 +8,8 @@
 mod tick;
 
 use super::group::add_frame_motion;
-use super::step::{MAX_SUBSTEPS, ROUNDING, first_element};
+use super::step::first_element;
+use super::substeps::{MAX_SUBSTEPS, ROUNDING};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum};
 use crate::dynamics::forcing_table::TableIndex;

@@ -4,7 +4,7 @@
 //! the second part waits for neither the first nor the memory of the forcing table.
 
 use super::super::group::{ForcingSample, Gate, add_frame_motion};
-use super::super::step::ROUNDING;
+use super::super::substeps::ROUNDING;
 use super::{Rows, SteadyMovements, SteadyTick};
 use crate::dynamics::canonical::{Canonical, amplitude};
 use crate::dynamics::forcing_table::TableIndex;
