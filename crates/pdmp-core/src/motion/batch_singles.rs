@@ -7,9 +7,9 @@ use ndarray::{ArrayView2, ArrayView3, ArrayViewMut3, Axis};
 use crate::error::Result;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
+use crate::motion::response_products::Product;
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::motion::transposed_rollout;
-use crate::motion::vector_jacobian::{Product, dot};
 use crate::validate::row_major;
 
 /// Movements without common response curves, which differ in τ, follow warped time or start at another phase.
@@ -86,6 +86,7 @@ impl Singles {
 
 /// Returns Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ + Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩ of a movement with its cotangents.
 fn scaled_time(cotangents: &[&[f64]], orders: [&[f64]; 3], dt: f64, n_dofs: usize) -> f64 {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
     let mut sum = 0.0;
     for (k, v) in cotangents.iter().enumerate().take(2) {
         if k > 0 {

@@ -15,6 +15,7 @@ pub(crate) mod limits;
 pub(crate) mod perturbation;
 pub(crate) mod prediction_band;
 pub(crate) mod rate_limits;
+mod response_products;
 pub(crate) mod rollout;
 pub(crate) mod sampled_path;
 pub(crate) mod stopping;

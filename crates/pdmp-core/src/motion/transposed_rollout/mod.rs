@@ -21,8 +21,8 @@ use crate::dynamics::transport::TransportSample;
 use crate::error::Result;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
+use crate::motion::response_products::Product;
 use crate::motion::rollout::{Clock, TimeGrid};
-use crate::motion::vector_jacobian::Product;
 use crate::numerics::simd::{F64x4, Kernel, Register, WIDTH, compute_many, groups, padded, unpad};
 use schedule::{NO_SAMPLE, Point, Schedule, Substep};
 
@@ -195,6 +195,7 @@ impl Kernel for Backward<'_> {
 impl Backward<'_> {
     /// Adds the cotangents of the motion at a sample.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // See `Kernel`.
     fn add_motion<T: Register>(&mut self, attractor: Attractor, sample: usize, at: &Point) {
         let Self { primitive, schedule, cotangents, sums } = self;
         let [rate, change, square] = schedule.rates[sample];
@@ -216,10 +217,7 @@ impl Backward<'_> {
             }
             let [e, z] = T::load_all([&group.state[0], &group.state[1]]);
             let [w, slope] = T::load_all([&group.forcing[0], &group.forcing[1]]);
-            group.state = [
-                (e + position - bend * stiffness).store(),
-                (z + flow - bend * attractor.alpha_z).store(),
-            ];
+            group.state = [(e + position - bend * stiffness).store(), (z + flow - bend * attractor.alpha_z).store()];
             group.forcing = [(w + flow).store(), (slope + bend).store()];
             group.centre = (T::load(&group.centre) + position).store();
             let TransportSample { value, slope, bend: curve } = lag;
@@ -250,8 +248,7 @@ impl Backward<'_> {
             let end = [w + (e * by_e[1] + z * by_z[1]), slope + (e * by_e[3] + z * by_z[3])];
             let [a, b, c, d] = add_gated(cubic, to, end);
             group.cubic = [a.store(), b.store(), c.store(), d.store()];
-            group.forcing =
-                [(e * by_e[0] + z * by_z[0]).store(), (e * by_e[2] + z * by_z[2]).store()];
+            group.forcing = [(e * by_e[0] + z * by_z[0]).store(), (e * by_e[2] + z * by_z[2]).store()];
             group.state = [(e * *ee + z * *ze).store(), (e * *ez + z * *zz).store()];
         }
     }
