@@ -15,6 +15,7 @@ use counting as random;
 use counting::{Random, allocations};
 use ndarray::Array2;
 use pdmp_core::motion::{Commands, Controllers, Limits, Motions};
+use pdmp_core::numerics::Threads;
 use pdmp_core::{Command, Conditions, Controller, Kind, Model, Status};
 use poses::{pose, screws, turning, wobbles};
 
@@ -159,7 +160,8 @@ fn limits(model: &Model) -> Limits {
 }
 
 /// Movements under random commands, masks, restarts, speeds and limits have the motion, the status, the time and the phase of
-/// single controllers to the bit: discrete and rhythmic ones, with learnt and immediate transport, of positions and poses.
+/// single controllers to the bit: discrete and rhythmic ones, with learnt and immediate transport, of positions and poses, on one
+/// thread and on several.
 #[test]
 fn controllers_move_as_single_ones_to_the_bit() {
     let mut paper = options(Kind::Discrete);
@@ -178,8 +180,9 @@ fn controllers_move_as_single_ones_to_the_bit() {
         };
         let conditions: Vec<_> = (0..N).map(|_| start(&mut random)).collect();
         // With the long tick, a movement takes several substeps.
-        for dt in [DT, 7.0 * DT] {
-            let mut together = Controllers::new(primitive, dt, &conditions, None).unwrap();
+        for (dt, threads) in [(DT, 1), (7.0 * DT, 1), (7.0 * DT, 3)] {
+            let together = Controllers::new(primitive, dt, &conditions, None).unwrap();
+            let mut together = together.with_threads(Threads::new(threads).unwrap());
             let mut alone: Vec<_> =
                 conditions.iter().map(|one| Controller::new(primitive, dt, one, None).unwrap()).collect();
             let (mut rows, mut load, mut statuses) = (Rows::new(model), Load::new(model), vec![Status::Working; N]);
@@ -227,6 +230,11 @@ fn controllers_move_as_single_ones_to_the_bit() {
                 steady += together.n_steady();
                 finished += statuses.iter().filter(|status| **status == Status::Finished).count();
                 let b = (random.next() * N as f64) as usize;
+                if random.next() < 1e-3 {
+                    // A copy, and one with other shares, move on as the original would.
+                    let threads = Threads::new(if threads == 1 { 1 } else { 2 + b % 3 }).unwrap();
+                    together = if b < 4 { together.clone() } else { together.with_threads(threads) };
+                }
                 match (random.next() * 400.0) as usize {
                     0..4 => {
                         let conditions = start(&mut random);
@@ -284,10 +292,11 @@ fn movements_become_steady() {
 /// Ticks with and without commands, masks and changed rates allocate nothing.
 #[test]
 fn ticks_of_controllers_allocate_nothing() {
-    for model in [&*REACH, &*CYCLE] {
+    for (model, threads) in [(&*REACH, 1), (&*CYCLE, 1), (&*REACH, 3)] {
         let kind = model.kind();
         let mut random = Random(3);
-        let mut together = Controllers::new(model.primitive(), DT, &vec![Conditions::default(); N], None).unwrap();
+        let together = Controllers::new(model.primitive(), DT, &vec![Conditions::default(); N], None).unwrap();
+        let mut together = together.with_threads(Threads::new(threads).unwrap());
         let (mut rows, mut load) = (Rows::new(model), Load::new(model));
         let mut counted = 0;
         for _ in 0..20_000 {

@@ -18,6 +18,7 @@ pub(crate) mod rate_limits;
 mod response_products;
 pub(crate) mod rollout;
 pub(crate) mod sampled_path;
+mod shares;
 pub(crate) mod stopping;
 pub(crate) mod superposition;
 pub(crate) mod time_law;
