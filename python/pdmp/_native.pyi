@@ -2117,7 +2117,7 @@ class Model:
         transition: float | None = None,
         context: _Context | _Contexts | None = None,
         out: Sequence[_Array] | None = None,  # three arrays (B, D)
-        threads: SupportsIndex | None = None,
+        threads: int | None = None,
         **changes: Unpack[_RowChanges],  # one value, or rows (B, n)
     ) -> Controllers:
         """Starts many movements that are computed together, tick by tick.
