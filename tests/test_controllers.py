@@ -63,7 +63,7 @@ def test_controllers_are_single_ones_to_the_bit(model: pdmp.Model) -> None:
 
 
 def test_threads_change_nothing(model: pdmp.Model) -> None:
-    """Ticks on several threads have the motion of one thread, to the bit, also in a forked process."""
+    """Ticks on several threads have the motion of one thread, to the bit, also after a fork."""
     rng = np.random.default_rng(1)
     styles = rng.normal(0, 0.3, (B, model.n_styles))
     one, several = (

@@ -60,7 +60,7 @@ def given_for(model: pdmp.Model) -> dict[str, Any]:
 
 
 def timed_for(model: pdmp.Model) -> dict[str, Any]:
-    """Returns conditions of a batch whose movements differ in tau, and in amplitude if they have one.
+    """Returns conditions of a batch whose movements differ in tau and, if rhythmic, in amplitude.
 
     No movement ends at a sample: its acceleration jumps there, and its velocity has no derivative
     with respect to tau.
@@ -184,14 +184,20 @@ def test_jax_differentiates_through_movements(model: pdmp.Model) -> None:
 
 
 def test_jax_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
-    """`jax.test_util.check_grads` accepts the gradients of movements that differ in every condition."""
+    """`jax.test_util.check_grads` accepts gradients of movements that differ in tau."""
     jax = pytest.importorskip("jax")
     check_grads = pytest.importorskip("jax.test_util").check_grads
     with jax.enable_x64(True):
         given = {n: jax.numpy.asarray(v, dtype=float) for n, v in timed_for(model).items()}
         move = pdmp.autodiff.jax_rollouts(model, derivatives=1, dt=0.05, duration=1.3)
         check_grads(
-            lambda given: jax.jit(move)(**given), (given,), 1, ["rev"], eps=1e-6, atol=1e-6, rtol=1e-5
+            lambda given: jax.jit(move)(**given),
+            (given,),
+            1,
+            ["rev"],
+            eps=1e-6,
+            atol=1e-6,
+            rtol=1e-5,
         )
 
 
@@ -222,7 +228,7 @@ def test_torch_differentiates_through_movements(model: pdmp.Model) -> None:
 
 
 def test_torch_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
-    """`torch.autograd.gradcheck` accepts the gradients of movements that differ in every condition."""
+    """`torch.autograd.gradcheck` accepts gradients of movements that differ in tau."""
     torch = pytest.importorskip("torch")
     given = {name: torch.tensor(value[:3]).double() for name, value in timed_for(model).items()}
     move = pdmp.autodiff.torch_rollouts(model, derivatives=1, dt=0.05, duration=1.3)

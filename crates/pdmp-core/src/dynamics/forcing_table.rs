@@ -82,7 +82,7 @@ impl ForcingBound {
 /// Coefficients of a cubic in powers of the clock since a knot; the first two are value and slope at the knot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
-pub(super) struct Cubic([F64x4; 4]);
+pub(super) struct Cubic(pub(super) [F64x4; 4]);
 
 /// Position in the table: the index of the first cubic at a knot, and the argument of the cubics: the clock since that knot,
 /// or p past the end.
@@ -126,7 +126,7 @@ impl Cubic {
 
 /// Evaluates a cubic and its slope.
 #[inline(always)]
-fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> CubicSample<T> {
+pub(super) fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> CubicSample<T> {
     let cube = cube * t;
     let sum = square + cube;
     CubicSample { value: value + (slope + sum * t) * t, slope: slope + (sum + sum + cube) * t }

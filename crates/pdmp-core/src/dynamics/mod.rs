@@ -5,6 +5,7 @@ pub(crate) mod additional_forcing;
 pub(crate) mod braking;
 pub(crate) mod canonical;
 pub(crate) mod command_filter;
+mod forcing_block;
 pub(crate) mod forcing_table;
 pub(crate) mod forcing_transpose;
 pub(crate) mod goal_transition;

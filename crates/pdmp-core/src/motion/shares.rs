@@ -52,7 +52,7 @@ impl<'a> Part<'a> {
     }
 
     /// Removes the first `n` movements, or all if there are fewer, and returns them.
-    fn take(&mut self, n: usize) -> Self {
+    fn split_first(&mut self, n: usize) -> Self {
         let n = n.min(self.controllers.len());
         let primitive = self.controllers[0].primitive();
         let (n_coordinates, n_dofs) = (primitive.n_coordinates(), primitive.n_dofs());
@@ -135,11 +135,11 @@ impl Shares {
     ) -> Result<()> {
         let Self { size, shares, pool } = self;
         let (Some(pool), 2..) = (pool, shares.len()) else {
-            return shares.iter_mut().try_for_each(|share| share.advance(&mut part.take(*size), tick));
+            return shares.iter_mut().try_for_each(|share| share.advance(&mut part.split_first(*size), tick));
         };
         let (mut tasks, n) = ([const { None }; MAX_TASKS], shares.len());
         for (task, share) in tasks.iter_mut().zip(shares) {
-            *task = Some((share, part.take(*size), Ok(())));
+            *task = Some((share, part.split_first(*size), Ok(())));
         }
         pool.for_each(&mut tasks[..n], &|task| {
             if let Some((share, part, result)) = task {
@@ -152,11 +152,7 @@ impl Shares {
 
 impl Share {
     /// Advances the selected movements of this share.
-    fn advance(
-        &mut self,
-        part: &mut Part,
-        tick: &impl Fn(&mut Controller, usize) -> Result<Status>,
-    ) -> Result<()> {
+    fn advance(&mut self, part: &mut Part, tick: &impl Fn(&mut Controller, usize) -> Result<Status>) -> Result<()> {
         let Self { steady, ending } = self;
         let Part { first, controllers, statuses, mask, rows } = part;
         ending.clear();

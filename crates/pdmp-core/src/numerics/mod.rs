@@ -2,6 +2,7 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+pub(crate) mod blocks;
 pub(crate) mod linear_algebra;
 pub(crate) mod matern;
 pub(crate) mod orthonormal_span;

@@ -150,7 +150,7 @@ fn is_open(claims: u64) -> bool {
 }
 
 impl Pool {
-    /// Starts the threads besides the calling one; fewer if the system cannot start as many.
+    /// Starts the threads besides the calling one, fewer if the system refuses one.
     pub(crate) fn new(threads: Threads) -> Self {
         let shared = Arc::new(Shared {
             claims: AtomicU64::new(0),
@@ -219,7 +219,7 @@ impl Drop for Pool {
 }
 
 impl Clone for Pool {
-    /// Returns a pool of as many threads of its own.
+    /// Returns a pool with the same number of threads, of its own.
     fn clone(&self) -> Self {
         Self::new(self.threads)
     }
@@ -227,7 +227,7 @@ impl Clone for Pool {
 
 impl fmt::Debug for Pool {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_tuple("Pool").field(&self.threads).finish()
+        write!(f, "Pool({})", self.threads.get())
     }
 }
 
