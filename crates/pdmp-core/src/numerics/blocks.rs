@@ -20,7 +20,7 @@ pub(crate) trait Block: Real {
     fn join(first: &F64x4, second: &F64x4) -> Self;
     /// Returns a register with the same value in all lanes.
     fn splat(value: f64) -> Self;
-    /// Writes the lanes to a slice of as many numbers at most.
+    /// Writes the lanes to a slice of that length or less.
     fn write(self, numbers: &mut [f64]);
     /// Writes all lanes to the first numbers of a slice.
     fn write_all(self, numbers: &mut [f64]);
