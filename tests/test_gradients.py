@@ -72,7 +72,8 @@ def timed_for(model: pdmp.Model) -> dict[str, Any]:
 @pytest.mark.parametrize("conditions", [given_for, timed_for])
 def test_gradients_are_differences_of_costs(model: pdmp.Model, conditions: Any) -> None:
     """The products are the gradients of a cost of positions and velocities by every condition."""
-    given, options = conditions(model), {"dt": 0.002, "duration": 1.3}
+    given = conditions(model)
+    options: dict[str, Any] = {"dt": 0.002, "duration": 1.3}
     if conditions is timed_for and model.kind == "rhythmic":
         options["phase"] = np.linspace(-1.0, 5.0, 7)
     wrt: Any = list(given)
