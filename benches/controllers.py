@@ -4,7 +4,9 @@
 and J = 3, each under its own style, goal and τ, on one thread. The plain programs integrate the
 same kind of primitive by Euler's method in numpy and, where it is installed, torch: transformation
 system, phase, and a forcing term from 50 basis functions. They have no filters of commands, limits,
-exact steps or status.
+exact steps or status. mp_pytorch, where it is installed, replans at every tick: it computes
+position and velocity at the next sample from the present ones, for B ProDMPs with ten weights and
+a goal for each degree of freedom.
 """
 
 import time
@@ -80,6 +82,52 @@ class Plain:
         self.phase = self.phase * (1 - DT * ALPHA_X * self.rate)
 
 
+class Replanned:
+    """ProDMPs of mp_pytorch in double precision, replanned from their motion at every tick."""
+
+    def __init__(self) -> None:
+        import torch
+        from mp_pytorch.mp import MPFactory
+
+        settings = {
+            "num_basis": 10,
+            "basis_bandwidth_factor": 2,
+            "num_basis_outside": 0,
+            "alpha": 25,
+            "alpha_phase": 3,
+            "dt": DT,
+        }
+        self.mp = MPFactory.init_mp(
+            "prodmp", settings, num_dof=D, tau=1.0, learn_tau=True, dtype=torch.float64
+        )
+        generator = torch.Generator().manual_seed(0)
+        numbers = {"generator": generator, "dtype": torch.float64}
+        self.parameters = torch.randn((B, self.mp.num_params), **numbers)
+        self.parameters[:, 0] = 0.8 + 0.7 * torch.rand(B, **numbers)
+        self.zeros = [torch.zeros(shape, dtype=torch.float64) for shape in (B, (B, D), (B, D))]
+        self.restart()
+
+    def restart(self) -> None:
+        """Sets the movements to their start."""
+        self.time, self.position, self.velocity = self.zeros
+
+    def tick(self) -> None:
+        """Performs one tick."""
+        ahead = self.time + DT
+        self.mp.update_inputs(
+            ahead[:, None], self.parameters, None, self.time, self.position, self.velocity
+        )
+        motion = self.mp.get_trajs(
+            get_pos=True,
+            get_pos_cov=False,
+            get_pos_std=False,
+            get_vel=True,
+            get_vel_cov=False,
+            get_vel_std=False,
+        )
+        self.time, self.position, self.velocity = ahead, motion["pos"][:, 0], motion["vel"][:, 0]
+
+
 def main() -> None:
     """Prints the table."""
     model = learnt()
@@ -110,6 +158,10 @@ def main() -> None:
         torch.set_num_threads(1)
         tensors = Plain(torch, torch.from_numpy)
         rows.append(("plain program in torch", median(tensors.tick, tensors.restart)))
+        if find_spec("mp_pytorch"):
+            replanned = Replanned()
+            name = "mp_pytorch, replanned at every tick"
+            rows.append((name, median(replanned.tick, replanned.restart, 20)))
     print(f"| tick of {B} movements, D = {D}, J = {J} | µs | ns a movement |\n|---|--:|--:|")
     for name, value in rows:
         print(f"| {name} | {value:.0f} | {1000 * value / B:.0f} |")

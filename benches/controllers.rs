@@ -11,6 +11,7 @@ use control_loop::model;
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use pdmp_core::motion::{Commands, Controllers, Motions};
+use pdmp_core::numerics::Threads;
 use pdmp_core::{Command, Conditions, Controller, Motion};
 
 const N: usize = 4096;
@@ -100,6 +101,8 @@ fn controllers(criterion: &mut Criterion) {
             let [position, velocity, acceleration] = &mut together;
             controllers.step(Some(&mask), &mut Motions { position, velocity, acceleration }).expect("a tick");
         }
+        let several = Threads::new(2).expect("some");
+        let on_two = Together { controllers: controllers.clone().with_threads(several), rows: together.clone() };
         let together = Together { controllers, rows: together };
         let mut alone: Vec<_> = (0..N)
             .map(|_| Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).expect("one"))
@@ -113,6 +116,9 @@ fn controllers(criterion: &mut Criterion) {
         for (load, goals) in [("settled", None), ("to new goals", Some(&goals))] {
             group.bench_function(format!("together, {load}, {clocks}"), |bench| {
                 bench.iter_custom(|n| time(&together, goals, n));
+            });
+            group.bench_function(format!("together, {load}, {clocks}, two threads"), |bench| {
+                bench.iter_custom(|n| time(&on_two, goals, n));
             });
             group.bench_function(format!("single, {load}, {clocks}"), |bench| {
                 bench.iter_custom(|n| time(&alone, goals, n));

@@ -57,6 +57,31 @@ fn rollouts(criterion: &mut Criterion) {
             );
         }
     }
+    // Movements that differ in τ, and so have no response curves in common.
+    let (n, taus) = (100, |b: usize| model.tau() * (0.8 + 0.004 * b as f64));
+    let styles = Array2::from_shape_fn((n, 3), |(b, j)| (b + j) as f64 / n as f64);
+    let conditions = BatchConditions {
+        style: Some(PerMovement::Each(styles)),
+        tau: Some(PerMovement::Each(Array2::from_shape_fn((n, 1), |(b, _)| taus(b)))),
+        ..BatchConditions::default()
+    };
+    let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(())).expect("a batch");
+    let mut outputs = [(); 2].map(|()| Array3::zeros(batch.shape()));
+    let cotangents = [(); 2].map(|()| Array3::from_elem(batch.shape(), 0.5));
+    let cotangents = cotangents.each_ref().map(|array| array.view());
+    group.bench_function("100 rollouts with velocities, each with its tau", |bench| {
+        bench.iter(|| {
+            let outputs = outputs.each_mut().map(|output| output.view_mut());
+            batch.write(0..n, outputs.into(), Threads::ONE, &mut |_| Ok(()))
+        });
+    });
+    let variables = [WithRespectTo::Style, WithRespectTo::Goal, WithRespectTo::Start, WithRespectTo::Tau];
+    for (name, variables) in [("", &variables[..3]), (" and tau", &variables[..])] {
+        let name = format!("100 gradients by style, goal, start{name}, each with its tau");
+        group.bench_function(name, |bench| {
+            bench.iter(|| batch.vector_jacobian(0..n, variables, &cotangents, Threads::ONE, &mut |_| Ok(())));
+        });
+    }
     let jacobian = |model: &Arc<Model>| {
         let (variable, derivative) = (WithRespectTo::Style, Derivative::Position);
         jacobian(model.primitive(), variable, derivative, &Conditions::default(), grid, &mut |_| Ok(()))

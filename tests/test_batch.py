@@ -140,8 +140,6 @@ def test_timing_and_amplitude_of_each_movement(reach: pdmp.Model, cycle: pdmp.Mo
     ):
         with pytest.raises(ValueError, match=message):
             reach.rollouts(style=STYLES[:4], **given)
-    with pytest.raises(ValueError, match="conditions must have one tau"):
-        reach.rollouts_vjp("goal", np.ones((4, 11, 2)), tau=taus, dt=0.1, duration=1.0)
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.4, 2.5])

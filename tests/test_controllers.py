@@ -1,5 +1,7 @@
 """Controllers of many movements agree with single ones, in memory of numpy."""
 
+import os
+import warnings
 from typing import Any
 
 import numpy as np
@@ -59,6 +61,38 @@ def test_controllers_are_single_ones_to_the_bit(model: pdmp.Model) -> None:
     assert stepped > 1000
     np.testing.assert_array_equal(together.time, [controller.time for controller in alone])
     np.testing.assert_array_equal(together.phase, [controller.phase for controller in alone])
+
+
+def test_threads_change_nothing(model: pdmp.Model) -> None:
+    """Ticks on several threads have the motion of one thread, to the bit, also after a fork."""
+    rng = np.random.default_rng(1)
+    styles = rng.normal(0, 0.3, (B, model.n_styles))
+    one, several = (
+        model.controllers(B, dt=0.01, style=styles, threads=threads) for threads in (1, 3)
+    )
+
+    def agree(ticks: int) -> bool:
+        for _ in range(ticks):
+            given = commands(model, rng) if rng.random() < 0.1 else {}
+            mask = rng.random(B) < 0.8
+            one.step(**given, mask=mask)
+            several.step(**given, mask=mask)
+        return all(np.array_equal(getattr(one, f), getattr(several, f)) for f in FIELDS)
+
+    assert agree(100)
+    if hasattr(os, "fork"):
+        with warnings.catch_warnings():
+            # Frameworks that other tests have imported warn of the threads that they started.
+            warnings.simplefilter("ignore")
+            child = os.fork()
+        if child == 0:
+            agreed = agree(100)
+            del several
+            os._exit(0 if agreed else 1)
+        assert os.waitpid(child, 0)[1] == 0
+    assert agree(100)
+    with pytest.raises(ValueError, match="threads = 0: must lie between 1 and 1024"):
+        model.controllers(B, threads=0)
 
 
 def test_outputs_are_the_same_arrays(reach: pdmp.Model) -> None:

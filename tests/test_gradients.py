@@ -59,9 +59,23 @@ def given_for(model: pdmp.Model) -> dict[str, Any]:
     return {**given, "amplitude": 0.7}
 
 
-def test_gradients_are_differences_of_costs(model: pdmp.Model) -> None:
+def timed_for(model: pdmp.Model) -> dict[str, Any]:
+    """Returns conditions of a batch whose movements differ in tau and, if rhythmic, in amplitude.
+
+    No movement ends at a sample: its acceleration jumps there, and its velocity has no derivative
+    with respect to tau.
+    """
+    given = {**given_for(model), "tau": model.tau * np.linspace(0.7137, 1.9, 7)}
+    return {**given, **({"amplitude": np.linspace(0.3, 2.0, 7)} if "amplitude" in given else {})}
+
+
+@pytest.mark.parametrize("conditions", [given_for, timed_for])
+def test_gradients_are_differences_of_costs(model: pdmp.Model, conditions: Any) -> None:
     """The products are the gradients of a cost of positions and velocities by every condition."""
-    given, options = given_for(model), {"dt": 0.002, "duration": 1.3}
+    given = conditions(model)
+    options: dict[str, Any] = {"dt": 0.002, "duration": 1.3}
+    if conditions is timed_for and model.kind == "rhythmic":
+        options["phase"] = np.linspace(-1.0, 5.0, 7)
     wrt: Any = list(given)
     movements = model.rollouts(**given, **options)
     found = model.rollouts_vjp(wrt, cotangents(movements), **given, **options)
@@ -70,6 +84,32 @@ def test_gradients_are_differences_of_costs(model: pdmp.Model) -> None:
         total = gradient if np.ndim(given[name]) == gradient.ndim else gradient.sum(axis=0)
         assert total.shape == expected.shape
         np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())
+
+
+def test_a_jacobian_is_that_from_phase_0(cycle: pdmp.Model) -> None:
+    """A Jacobian does not take a phase, which its responses do not have."""
+    with pytest.raises(ValueError, match="phase does not apply"):
+        cycle.jacobian("style", phase=1.0)
+
+
+def test_segment_durations_have_gradients_but_for_tau() -> None:
+    """Movements in warped time have exact gradients; tau, which they do not have, is refused."""
+    s = np.linspace(0, 1, 101)
+    demos = [
+        np.column_stack([s**power, h * np.sin(np.pi * s**power)])
+        for h in (0.2, 0.4)
+        for power in (1.0, 1.5)
+    ]
+    model = pdmp.fit(demos, dt=0.01, n_styles=2, alignment=pdmp.TimeWarp(4))
+    given: dict[str, Any] = {"style": RNG.normal(size=(3, 2)), "goal": RNG.normal(size=(3, 2))}
+    options = {"dt": 0.005, "duration": 1.2, "segment_durations": model.segment_durations[:3]}
+    movements = model.rollouts(**given, **options)
+    found = model.rollouts_vjp(["style", "goal"], cotangents(movements), **given, **options)
+    for name, gradient in zip(given, found, strict=True):
+        expected = difference(model, given, name, options)
+        np.testing.assert_allclose(gradient, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())
+    with pytest.raises(ValueError, match="tau does not apply to movements that follow"):
+        model.rollouts_vjp("tau", movements[0], **given, **options)
 
 
 def test_products_are_those_with_jacobians(model: pdmp.Model) -> None:
@@ -144,6 +184,24 @@ def test_jax_differentiates_through_movements(model: pdmp.Model) -> None:
         np.testing.assert_array_equal(mapped, model.rollouts(style=STYLES, **options)[0])
 
 
+def test_jax_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
+    """`jax.test_util.check_grads` accepts gradients of movements that differ in tau."""
+    jax = pytest.importorskip("jax")
+    check_grads = pytest.importorskip("jax.test_util").check_grads
+    with jax.enable_x64(True):
+        given = {n: jax.numpy.asarray(v, dtype=float) for n, v in timed_for(model).items()}
+        move = pdmp.autodiff.jax_rollouts(model, derivatives=1, dt=0.05, duration=1.3)
+        check_grads(
+            lambda given: jax.jit(move)(**given),
+            (given,),
+            1,
+            ["rev"],
+            eps=1e-6,
+            atol=1e-6,
+            rtol=1e-5,
+        )
+
+
 def test_jax_keeps_single_precision(reach: pdmp.Model) -> None:
     """Conditions in single precision have movements and gradients in it."""
     jax = pytest.importorskip("jax")
@@ -168,6 +226,19 @@ def test_torch_differentiates_through_movements(model: pdmp.Model) -> None:
         expected = difference(model, given, name, options)
         scale = abs(expected).max()
         np.testing.assert_allclose(tensor.grad, expected, rtol=1e-5, atol=1e-6 * scale)
+
+
+def test_torch_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
+    """`torch.autograd.gradcheck` accepts gradients of movements that differ in tau."""
+    torch = pytest.importorskip("torch")
+    given = {name: torch.tensor(value[:3]).double() for name, value in timed_for(model).items()}
+    move = pdmp.autodiff.torch_rollouts(model, derivatives=1, dt=0.05, duration=1.3)
+
+    def moved(*values: Any) -> Any:
+        return move(**dict(zip(given, values, strict=True)))
+
+    tensors = [value.requires_grad_() for value in given.values()]
+    assert torch.autograd.gradcheck(moved, tensors, eps=1e-6, atol=1e-6, rtol=1e-5)
 
 
 def test_torch_keeps_types(reach: pdmp.Model) -> None:

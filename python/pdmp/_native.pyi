@@ -1305,8 +1305,9 @@ class Model:
 
         For a function L of the results of `rollouts`, with the cotangents v = ∂L/∂y, returns the vector-Jacobian products
         ∂L/∂x = Σ_t v(t)·∂y(t)/∂x of the conditions x. A movement is linear in all conditions but tau, so that the products
-        are exact; no Jacobian is formed, and a call takes about as long as `rollouts`. With respect to tau, they hold at
-        fixed times. `pdmp.autodiff` wraps both calls for torch and jax.
+        are exact; no Jacobian is formed, and a call takes about as long as `rollouts`, also of movements that differ in tau,
+        phase or segment durations. With respect to tau, they hold at fixed times. `pdmp.autodiff` wraps both calls for torch
+        and jax.
 
         Parameters
         ----------
@@ -1334,9 +1335,9 @@ class Model:
         Raises
         ------
         ValueError
-            An argument that `rollouts` rejects; movements that differ in tau, follow `segment_durations` or start at a
-            `phase`; cotangents of another shape, or not finite; a condition of the other kind of primitive; a velocity or
-            start of which there is none to differentiate by; tau with accelerations; or a model with rotations.
+            An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind of
+            primitive; a velocity or start of which there is none to differentiate by; tau with accelerations or
+            `segment_durations`; or a model with rotations.
         TypeError
             As in `rollouts`.
 
@@ -2119,6 +2120,7 @@ class Model:
         transition: float | None = None,
         context: _Context | _Contexts | None = None,
         out: Sequence[_Array] | None = None,  # three arrays (B, D)
+        threads: int | None = None,
         **changes: Unpack[_RowChanges],  # one value, or rows (B, n)
     ) -> Controllers:
         """Starts many movements that are computed together, tick by tick.
@@ -2139,6 +2141,9 @@ class Model:
             Context of all movements, or of each, whose prediction supplies absent conditions.
         out : tuple of ndarray, (B, D), optional
             Writable float64 arrays, contiguous by rows, for positions, velocities and accelerations.
+        threads : int, optional
+            Number of threads of a tick, by default one. The others wait for the next tick, for some fifty microseconds without
+            sleep, and end with the movements. The motion does not depend on it.
         **changes
             Single conditions by name, as in `rollout`; each may have a leading axis, with one row for each movement.
 

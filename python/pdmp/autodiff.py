@@ -51,7 +51,8 @@ def torch_rollouts(
     -------
     callable
         Function of conditions by name, each a tensor (n,) or (B, n); `tau` and `amplitude` are
-        scalars. It returns a tuple of tensors (B, T, D): positions, and the derivatives asked for.
+        scalars or (B,). It returns a tuple of tensors (B, T, D): positions, and the derivatives
+        asked for.
         Gradients with respect to `tau` hold at fixed times, without accelerations. Second
         derivatives are not available.
 
@@ -133,7 +134,8 @@ def jax_rollouts(
     -------
     callable
         Function of conditions by name, each an array (n,) or (B, n); `tau` and `amplitude` are
-        scalars. It returns a tuple of arrays (B, T, D): positions, and the derivatives asked for.
+        scalars or (B,). It returns a tuple of arrays (B, T, D): positions, and the derivatives
+        asked for.
         Gradients with respect to `tau` hold at fixed times, without accelerations. Second and
         forward derivatives are not available.
 

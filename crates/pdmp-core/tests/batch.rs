@@ -402,7 +402,8 @@ fn movements_may_differ_in_timing_and_amplitude() {
 }
 
 /// Conditions that a batch cannot have are refused by name: a start velocity for some movements only, and a phase of a discrete
-/// movement. Time constants that are equal but for rounding keep the response curves; gradients need them.
+/// movement. Time constants that are equal but for rounding keep the response curves; gradients by other ones are those of
+/// equal ones, to rounding.
 #[test]
 fn conditions_that_a_batch_cannot_share_are_refused() {
     let none = Conditions::default;
@@ -423,10 +424,12 @@ fn conditions_that_a_batch_cannot_share_are_refused() {
         let conditions = BatchConditions::each(REACH.primitive(), &[tau(REACH.tau()), tau(second)]).unwrap();
         let batch = batch(REACH.primitive(), conditions, grid(0.01, 1.0), &mut |_| Ok(())).unwrap();
         let cotangents = Array3::ones(batch.shape());
-        batch.vector_jacobian(0..2, &[WithRespectTo::Goal], &[cotangents.view()], Threads::ONE, &mut |_| Ok(()))
+        let found =
+            batch.vector_jacobian(0..2, &[WithRespectTo::Goal], &[cotangents.view()], Threads::ONE, &mut |_| Ok(()));
+        found.unwrap()[0].row(1).to_owned()
     };
-    assert!(gradient(REACH.tau() * (1.0 + 1e-12)).is_ok());
-    assert_eq!(gradient(2.0 * REACH.tau()).unwrap_err().argument(), Some("conditions"));
+    let [equal, near] = [1e-12, 2e-9].map(|difference| gradient(REACH.tau() * (1.0 + difference)));
+    assert!(equal != near && equal.iter().zip(&near).all(|(a, b)| (a - b).abs() < 1e-6 * a.abs()));
 }
 
 /// Invalid conditions are rejected with the name of the argument and its numbers.

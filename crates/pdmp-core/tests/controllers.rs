@@ -15,10 +15,12 @@ use counting as random;
 use counting::{Random, allocations};
 use ndarray::Array2;
 use pdmp_core::motion::{Commands, Controllers, Limits, Motions};
-use pdmp_core::{Command, Conditions, Controller, Kind, Model, Status};
+use pdmp_core::numerics::Threads;
+use pdmp_core::{Command, Conditions, Controller, Demonstration, Kind, Model, Sampling, Status};
 use poses::{pose, screws, turning, wobbles};
 
-const N: usize = 9;
+/// More than one block of the steady tick, and a rest.
+const N: usize = 37;
 const DT: f64 = 1.5e-3;
 
 /// Output of all movements.
@@ -153,20 +155,41 @@ fn poses_of(kind: Kind) -> Arc<Model> {
     learn(&demos, &options(kind))
 }
 
+/// Returns a model of more degrees of freedom, those of the demonstrations in turn: of two, three and four groups of registers.
+fn wide(demos: &[Demonstration], n_dofs: usize) -> Arc<Model> {
+    let widened = |demo: &Demonstration| {
+        let (rows, columns) = demo.position().dim();
+        let of = |(c, d): (usize, usize)| demo.position()[[c, d % columns]] * (1.0 + 0.1 * d as f64);
+        let position = Array2::from_shape_fn((rows, n_dofs), of);
+        Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
+    };
+    let kind = if demos[0].n_dofs() == 3 { Kind::Discrete } else { Kind::Rhythmic };
+    learn(&demos.iter().map(widened).collect::<Vec<_>>(), &options(kind))
+}
+
 fn limits(model: &Model) -> Limits {
     let scaled = |scale: f64| Some(model.ranges().iter().map(|range| scale * range).collect::<Vec<_>>());
     Limits { velocity: scaled(3.0), acceleration: scaled(30.0), synchronous: false, ..Limits::default() }
 }
 
 /// Movements under random commands, masks, restarts, speeds and limits have the motion, the status, the time and the phase of
-/// single controllers to the bit: discrete and rhythmic ones, with learnt and immediate transport, of positions and poses.
+/// single controllers to the bit: discrete and rhythmic ones, with learnt and immediate transport, of positions and poses, on one
+/// thread and on several.
 #[test]
 fn controllers_move_as_single_ones_to_the_bit() {
     let mut paper = options(Kind::Discrete);
     paper.canonical = common::immediate();
     let immediate = learn(&reaches(), &paper);
-    let models =
-        [Arc::clone(&REACH), Arc::clone(&CYCLE), immediate, poses_of(Kind::Discrete), poses_of(Kind::Rhythmic)];
+    let models = [
+        Arc::clone(&REACH),
+        Arc::clone(&CYCLE),
+        immediate,
+        poses_of(Kind::Discrete),
+        poses_of(Kind::Rhythmic),
+        wide(&reaches(), 7),
+        wide(&cycles(), 10),
+        wide(&reaches(), 14),
+    ];
     for (number, model) in models.iter().enumerate() {
         let (kind, primitive) = (model.kind(), model.primitive());
         let is_pose = model.n_coordinates() > model.n_dofs();
@@ -178,19 +201,20 @@ fn controllers_move_as_single_ones_to_the_bit() {
         };
         let conditions: Vec<_> = (0..N).map(|_| start(&mut random)).collect();
         // With the long tick, a movement takes several substeps.
-        for dt in [DT, 7.0 * DT] {
-            let mut together = Controllers::new(primitive, dt, &conditions, None).unwrap();
+        for (dt, threads) in [(DT, 1), (7.0 * DT, 1), (7.0 * DT, 3)] {
+            let together = Controllers::new(primitive, dt, &conditions, None).unwrap();
+            let mut together = together.with_threads(Threads::new(threads).unwrap());
             let mut alone: Vec<_> =
                 conditions.iter().map(|one| Controller::new(primitive, dt, one, None).unwrap()).collect();
             let (mut rows, mut load, mut statuses) = (Rows::new(model), Load::new(model), vec![Status::Working; N]);
             let mut expected = Rows::new(model);
             let (mut commanded, mut finished, mut steady) = (0, 0, 0);
-            for _ in 0..6000 {
+            for _ in 0..2000 {
                 load.mask(&mut random);
                 let is_masked = random.next() < 0.5;
                 let mask = is_masked.then_some(&load.mask.clone()[..]).map(<[bool]>::to_vec);
                 let mask = mask.as_deref();
-                let given = (random.next() < 0.004).then(|| {
+                let given = (random.next() < 0.01).then(|| {
                     load.draw(model, &mut random);
                     Given::draw(&mut random, model, number != 2)
                 });
@@ -227,6 +251,11 @@ fn controllers_move_as_single_ones_to_the_bit() {
                 steady += together.n_steady();
                 finished += statuses.iter().filter(|status| **status == Status::Finished).count();
                 let b = (random.next() * N as f64) as usize;
+                if random.next() < 1e-3 {
+                    // A copy, and one with other shares, move on as the original would.
+                    let threads = Threads::new(if threads == 1 { 1 } else { 2 + b % 3 }).unwrap();
+                    together = if b < 4 { together.clone() } else { together.with_threads(threads) };
+                }
                 match (random.next() * 400.0) as usize {
                     0..4 => {
                         let conditions = start(&mut random);
@@ -256,7 +285,7 @@ fn controllers_move_as_single_ones_to_the_bit() {
                     _ => {}
                 }
             }
-            assert!(commanded > 10, "{commanded}");
+            assert!(commanded > 5, "{commanded}");
             assert!(kind == Kind::Rhythmic || finished > 1000, "{finished}");
             assert!(rows.position.iter().all(|x| x.is_finite()));
             assert!(is_pose || steady > 1000, "{steady}");
@@ -284,10 +313,11 @@ fn movements_become_steady() {
 /// Ticks with and without commands, masks and changed rates allocate nothing.
 #[test]
 fn ticks_of_controllers_allocate_nothing() {
-    for model in [&*REACH, &*CYCLE] {
+    for (model, threads) in [(&*REACH, 1), (&*CYCLE, 1), (&*REACH, 3)] {
         let kind = model.kind();
         let mut random = Random(3);
-        let mut together = Controllers::new(model.primitive(), DT, &vec![Conditions::default(); N], None).unwrap();
+        let together = Controllers::new(model.primitive(), DT, &vec![Conditions::default(); N], None).unwrap();
+        let mut together = together.with_threads(Threads::new(threads).unwrap());
         let (mut rows, mut load) = (Rows::new(model), Load::new(model));
         let mut counted = 0;
         for _ in 0..20_000 {

@@ -8,10 +8,11 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::{Array2, Array3, ArrayView3, Axis, s};
-use pdmp_core::model::Derivative;
+use pdmp_core::learning::{TimeScaling, Truncation};
+use pdmp_core::model::{Derivative, TimeWarp};
 use pdmp_core::motion::{self, Batch, BatchConditions, PerMovement, TimeGrid, WithRespectTo, batch};
 use pdmp_core::numerics::Threads;
-use pdmp_core::{Conditions, Error, Kind, Model, rollout};
+use pdmp_core::{Conditions, Demonstration, Error, Kind, Model, rollout};
 use proptest::prelude::*;
 
 fn prepared(model: &Arc<Model>, conditions: &BatchConditions, grid: TimeGrid) -> Batch {
@@ -167,6 +168,153 @@ fn gradient_by_tau_is_a_difference_of_rollouts() {
         }
     }
     assert_eq!(compared, 4);
+}
+
+/// Models of the tests of movements with a timing of their own: learnt and immediate transport, rhythmic, and both kinds in
+/// warped time.
+fn timed_models() -> Vec<Arc<Model>> {
+    let warped = |demos: &[Demonstration], kind| {
+        let options = options(kind).n_styles(Truncation::Rank(2)).time_scaling(TimeScaling::Warp(TimeWarp::default()));
+        learn(demos, &options)
+    };
+    let mut at_once = options(Kind::Discrete).n_styles(Truncation::Rank(2));
+    at_once.canonical = immediate();
+    vec![
+        REACH.clone(),
+        CYCLE.clone(),
+        learn(&reaches(), &at_once),
+        warped(&reaches(), Kind::Discrete),
+        warped(&cycles(), Kind::Rhythmic),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Movements of different τ, phase or segment durations have the gradients of their own conditions: differences of their
+    /// rollouts, which are linear in all conditions but τ, whose gradient is that of a batch of one where it has one.
+    #[test]
+    fn movements_of_their_own_timing_have_their_own_gradients(
+        (start, velocity, goal_velocity) in (any::<bool>(), any::<bool>(), any::<bool>()),
+        (dt, samples) in prop_oneof![(Just(0.003), 2usize..600), (Just(0.04), 2usize..50)],
+        (orders, seed) in (1usize..4, any::<u64>()),
+    ) {
+        let mut compared = 0;
+        for (case, model) in timed_models().iter().enumerate() {
+            let (n, n_dofs, discrete) = (3, model.n_dofs(), model.kind() == Kind::Discrete);
+            let row = |seed: u64| noise((1, 1, n_dofs), seed).into_raw_vec_and_offset().0;
+            let warped = model.breaks().len() > 2;
+            let durations = |b: usize| model.demonstrated().segment_durations.row(b).to_vec();
+            let movements: Vec<Conditions> = (0..n as u64)
+                .map(|b| Conditions {
+                    style: Some(noise((1, 1, 2), seed ^ b).into_raw_vec_and_offset().0),
+                    goal: discrete.then(|| row(seed ^ (b + 10))),
+                    anchor: (!discrete).then(|| row(seed ^ (b + 10))),
+                    start: (start || discrete).then(|| row(seed ^ (b + 20))),
+                    velocity: velocity.then(|| row(seed ^ (b + 30))),
+                    goal_velocity: (discrete && goal_velocity && case != 2).then(|| row(seed ^ (b + 40))),
+                    amplitude: (!discrete).then_some(0.4 + b as f64),
+                    tau: (!warped).then_some(model.tau() * (0.6 + 0.3 * b as f64)),
+                    segment_durations: warped.then(|| durations(b as usize)),
+                    phase: (!discrete && !warped).then_some(1.7 * b as f64),
+                    ..Conditions::default()
+                })
+                .collect();
+            let conditions = BatchConditions::each(model.primitive(), &movements).unwrap();
+            let grid = grid(dt, dt * (samples - 1) as f64);
+            let mut variables = variables(model.kind(), &conditions, orders);
+            variables.retain(|variable| !warped || *variable != WithRespectTo::Tau);
+            let prepared = prepared(model, &conditions, grid);
+            let cotangents: Vec<_> = (0..orders).map(|k| noise(prepared.shape(), seed + 9 + k as u64)).collect();
+            let found = gradients(&prepared, &variables, &cotangents);
+            let cost = |b: usize, conditions: &Conditions| {
+                let moved = rollout(model.primitive(), conditions, grid).unwrap();
+                let rows = [moved.position, moved.velocity, moved.acceleration];
+                let sum = |(v, y): (&Array3<f64>, &Array2<f64>)| {
+                    let products = &v.index_axis(Axis(0), b) * y;
+                    (products.sum(), products.mapv(f64::abs).sum())
+                };
+                cotangents.iter().zip(&rows).map(sum).fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d))
+            };
+            for (b, one) in movements.iter().enumerate() {
+                let (present, mut size) = cost(b, one);
+                for (variable, found) in variables.iter().zip(&found) {
+                    for (column, &found) in found.row(b).iter().enumerate() {
+                        if *variable == WithRespectTo::Tau {
+                            if one.phase.is_none_or(|phase| phase == 0.0) {
+                                let shared = BatchConditions::shared(model.primitive(), one.clone()).unwrap();
+                                let views: Vec<_> = cotangents.iter().map(|v| v.slice(s![b..b + 1, .., ..])).collect();
+                                let alone = batch(model.primitive(), shared, grid, &mut |_| Ok(())).unwrap();
+                                let expected =
+                                    alone.vector_jacobian(0..1, &[*variable], &views, Threads::ONE, &mut |_| Ok(()));
+                                let expected = expected.unwrap()[0][[0, 0]];
+                                prop_assert!((found - expected).abs() < 1e-9 * size, "{found} {expected}");
+                                compared += 1;
+                            }
+                            continue;
+                        }
+                        let mut moved = one.clone();
+                        {
+                            let Conditions { style, goal, anchor, start, velocity, goal_velocity, .. } = &mut moved;
+                            let vector = match variable {
+                                WithRespectTo::Style => style,
+                                WithRespectTo::Goal => goal,
+                                WithRespectTo::Anchor => anchor,
+                                WithRespectTo::Start => start,
+                                WithRespectTo::Velocity => velocity,
+                                _ => goal_velocity,
+                            };
+                            match variable {
+                                WithRespectTo::Amplitude => *moved.amplitude.as_mut().unwrap() += 1.0,
+                                _ => vector.as_mut().unwrap()[column] += 1.0,
+                            }
+                        }
+                        let (value, bound) = cost(b, &moved);
+                        size = size.max(bound);
+                        let error = (found - (value - present)).abs();
+                        prop_assert!(error < 1e-11 * size, "{case} {variable:?} {found} {}", value - present);
+                        compared += 1;
+                    }
+                }
+            }
+            let views: Vec<_> = cotangents.iter().map(|array| array.slice(s![1.., .., ..])).collect();
+            let threads = Threads::new(2).unwrap();
+            let last = prepared.vector_jacobian(1..n, &variables, &views, threads, &mut |_| Ok(())).unwrap();
+            for (last, all) in last.iter().zip(&found) {
+                prop_assert_eq!(last, &all.slice(s![1.., ..]));
+            }
+        }
+        prop_assert!(compared > 60);
+    }
+}
+
+/// The gradients by different τ, at phases of their own, are central differences of rollouts.
+#[test]
+fn gradients_by_different_tau_are_differences_of_rollouts() {
+    let phases = PerMovement::Each(ndarray::array![[0.3], [4.0]]);
+    let conditions = BatchConditions {
+        tau: Some(PerMovement::Each(ndarray::array![[0.12], [0.3]])),
+        phase: Some(phases),
+        velocity: Some(vec![0.4, 0.2]).map(PerMovement::All),
+        start: Some(vec![0.4, 0.2]).map(PerMovement::All),
+        ..BatchConditions::default()
+    };
+    let grid = grid(1e-3, 1.2);
+    let prepared = prepared(&CYCLE, &conditions, grid);
+    let cotangents: Vec<_> = (0..2).map(|k| noise(prepared.shape(), 5 + k)).collect();
+    let found = &gradients(&prepared, &[WithRespectTo::Tau], &cotangents)[0];
+    for b in 0..2 {
+        let one = Conditions { phase: rows(&conditions.phase, b).map(|row| row[0]), ..condition(&conditions, b) };
+        let tau = one.tau.unwrap();
+        let cost = |step: f64| {
+            let conditions = Conditions { tau: Some(tau * (1.0 + step)), ..one.clone() };
+            let moved = rollout(CYCLE.primitive(), &conditions, grid).unwrap();
+            let dot = |v: &Array3<f64>, y: &Array2<f64>| (&v.index_axis(Axis(0), b) * y).sum();
+            dot(&cotangents[0], &moved.position) + dot(&cotangents[1], &moved.velocity)
+        };
+        let (found, expected) = (found[[b, 0]], (cost(1e-5) - cost(-1e-5)) / (2e-5 * tau));
+        assert!((found - expected).abs() < 1e-5 * expected.abs().max(1.0), "{found} {expected}");
+    }
 }
 
 /// Cotangents of other layouts have the same gradients.

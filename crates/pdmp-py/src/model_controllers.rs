@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pdmp_core::numerics::Threads;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::controllers::Controllers;
 use crate::controllers_arguments::conditions_of_each;
-use crate::convert::{Matrix, items};
+use crate::convert::{Matrix, items, threads};
 use crate::error::raise;
 use crate::instance;
 use crate::model::Model;
@@ -35,6 +36,9 @@ impl Model {
     ///     Context of all movements, or of each, whose prediction supplies absent conditions.
     /// out : tuple of ndarray, (B, D), optional
     ///     Writable float64 arrays, contiguous by rows, for positions, velocities and accelerations.
+    /// threads : int, optional
+    ///     Number of threads of a tick, by default one. The others wait for the next tick, for some fifty microseconds without
+    ///     sleep, and end with the movements. The motion does not depend on it.
     /// **changes
     ///     Single conditions by name, as in `rollout`; each may have a leading axis, with one row for each movement.
     ///
@@ -60,10 +64,10 @@ impl Model {
     #[pyo3(
         signature = (
             n_movements, dt=Scalar::Number(0.001), conditions=None, *, limits=None, transition=None, context=None, out=None,
-            **changes
+            threads=None, **changes
         ),
         text_signature = "($self, n_movements, dt=0.001, conditions=None, *, limits=None, transition=None, context=None, \
-                          out=None, **changes)"
+                          out=None, threads=None, **changes)"
     )]
     #[allow(clippy::too_many_arguments)]
     fn controllers(
@@ -76,9 +80,11 @@ impl Model {
         transition: Option<Scalar<'_>>,
         context: Option<&Bound<'_, PyAny>>,
         out: Option<&Bound<'_, PyAny>>,
+        threads: Option<Scalar<'_>>,
         changes: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Controllers> {
         let n = n_movements.count("n_movements")?;
+        let threads = threads.map_or(Ok(Threads::ONE), |threads| self::threads(Some(threads)))?;
         let (dt, transition) = (dt.number("dt")?, optional_number("transition", transition)?);
         let conditions = conditions_of_each(py, &self.0, n, conditions, context, changes)?;
         let mut inner =
@@ -88,6 +94,7 @@ impl Model {
             (0..n).try_for_each(|b| inner.set_limits(b, limits)).map_err(raise)?;
         }
         let columns = [self.0.n_coordinates(), self.0.n_dofs(), self.0.n_dofs()];
+        let inner = if threads == Threads::ONE { inner } else { inner.with_threads(threads) };
         Controllers::new(py, Arc::clone(&self.0), inner, outputs(py, out, n, columns)?)
     }
 }

@@ -81,6 +81,55 @@ impl Canonical {
     }
 }
 
+/// Compensated sums of many movements.
+#[derive(Clone, Debug)]
+pub(crate) struct CompensatedSums {
+    values: Vec<f64>,
+    compensations: Vec<f64>,
+}
+
+impl CompensatedSums {
+    /// Returns `n` sums of zero.
+    pub(crate) fn zeros(n: usize) -> Self {
+        Self { values: vec![0.0; n], compensations: vec![0.0; n] }
+    }
+
+    /// Returns a sum.
+    #[inline(always)]
+    pub(crate) fn get(&self, i: usize) -> CompensatedSum {
+        CompensatedSum { value: self.values[i], compensation: self.compensations[i] }
+    }
+
+    /// Overwrites a sum.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, i: usize, sum: CompensatedSum) {
+        (self.values[i], self.compensations[i]) = (sum.value, sum.compensation);
+    }
+
+    /// Adds a step each to consecutive sums from one on, and returns the sums.
+    #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // The loop over arrays compiles to vector instructions.
+    pub(crate) fn add_each<const N: usize>(&mut self, first: usize, steps: &[f64; N]) -> [f64; N] {
+        let (Some(values), Some(compensations)) =
+            (self.values[first..].first_chunk_mut::<N>(), self.compensations[first..].first_chunk_mut::<N>())
+        else {
+            return [0.0; N];
+        };
+        for i in 0..N {
+            let mut sum = CompensatedSum { value: values[i], compensation: compensations[i] };
+            sum.add(steps[i]);
+            (values[i], compensations[i]) = (sum.value, sum.compensation);
+        }
+        *values
+    }
+
+    /// Returns consecutive sums from one on, `None` beyond the last.
+    #[inline(always)]
+    pub(crate) fn block<const N: usize>(&self, first: usize) -> Option<&[f64; N]> {
+        self.values[first..].first_chunk()
+    }
+}
+
 /// Wraps an angle to [0, 2π).
 pub(crate) fn turn(phi: f64) -> f64 {
     // The remainder is slow, and most angles of a control loop need none. That of a tiny negative angle rounds to 2π.
@@ -106,6 +155,7 @@ impl CompensatedSum {
     }
 
     /// Adds a step.
+    #[inline(always)]
     pub(crate) fn add(&mut self, step: f64) {
         let step = step + self.compensation;
         let sum = self.value + step;

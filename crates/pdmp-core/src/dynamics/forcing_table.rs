@@ -82,17 +82,20 @@ impl ForcingBound {
 /// Coefficients of a cubic in powers of the clock since a knot; the first two are value and slope at the knot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
-struct Cubic([F64x4; 4]);
+pub(super) struct Cubic(pub(super) [F64x4; 4]);
 
 /// Position in the table: the index of the first cubic at a knot, and the argument of the cubics: the clock since that knot,
 /// or p past the end.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TableIndex {
-    first: usize,
+    pub(super) first: usize,
     pub(crate) t: f64,
 }
 
 impl TableIndex {
+    /// Position in no cell.
+    pub(crate) const NONE: Self = Self { first: usize::MAX, t: 0.0 };
+
     /// Returns whether both lie in one cell.
     #[inline(always)]
     pub(crate) fn is_in_cell_of(self, other: Self) -> bool {
@@ -111,7 +114,7 @@ impl Cubic {
     }
 
     #[inline(always)]
-    fn load<T: Register>(&self) -> [T; 4] {
+    pub(super) fn load<T: Register>(&self) -> [T; 4] {
         let [value, slope, square, cube] = &self.0;
         [T::load(value), T::load(slope), T::load(square), T::load(cube)]
     }
@@ -123,7 +126,7 @@ impl Cubic {
 
 /// Evaluates a cubic and its slope.
 #[inline(always)]
-fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> CubicSample<T> {
+pub(super) fn evaluate<T: Real>([value, slope, square, cube]: [T; 4], t: f64) -> CubicSample<T> {
     let cube = cube * t;
     let sum = square + cube;
     CubicSample { value: value + (slope + sum * t) * t, slope: slope + (sum + sum + cube) * t }
@@ -200,7 +203,7 @@ impl ForcingTable {
 
     /// Returns the cubics of all styles for one group of DoFs at the knot whose first cubic has index `first`.
     #[inline(always)]
-    fn cubics(&self, first: usize, group: usize) -> &[Cubic] {
+    pub(super) fn cubics(&self, first: usize, group: usize) -> &[Cubic] {
         let start = first + group * self.n_styles;
         &self.cubics[start..start + self.n_styles]
     }

@@ -289,6 +289,15 @@ impl Primitive {
         propagator.advance(knot, forcing)
     }
 
+    /// Returns state and forcing of each unit style at the end of a movement with learnt transport that starts at rest, for
+    /// one group of DoFs.
+    pub(crate) fn arrivals(&self, group: usize) -> impl Iterator<Item = (State<F64x4>, F64x4)> {
+        let end = self.forcing_table.knot(self.forcing_table.cells());
+        let states = &self.unit_states[self.unit_states.len().saturating_sub(end.len())..];
+        let arrivals = states.iter().zip(end).map(|(state, w)| (*state, w.value));
+        arrivals.skip(group * self.n_styles()).take(self.n_styles())
+    }
+
     /// Returns the braking rate κ of a discrete movement past its end, per unit of the clock; `None` for immediate transport,
     /// where the forcing decays with the phase, and for rhythmic movements.
     pub fn braking(&self) -> Option<f64> {

@@ -142,7 +142,7 @@ impl Batch {
 
     /// Returns the number of style parameters.
     pub(super) fn n_styles(&self) -> usize {
-        self.responses.of(Derivative::Position).styles.len() - usize::from(self.is_forced)
+        self.styles.row(0).len()
     }
 
     /// Returns the number of columns of positions, or of a derivative: coordinates or DoFs.

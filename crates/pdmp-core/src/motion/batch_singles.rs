@@ -2,31 +2,37 @@
 
 use std::sync::Arc;
 
-use ndarray::{ArrayView2, ArrayViewMut3, Axis};
+use ndarray::{ArrayView2, ArrayView3, ArrayViewMut3, Axis};
 
 use crate::error::Result;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
+use crate::motion::response_products::Product;
 use crate::motion::rollout::{TimeGrid, rollout};
+use crate::motion::transposed_rollout;
+use crate::validate::row_major;
 
 /// Movements without common response curves, which differ in τ, follow warped time or start at another phase.
 #[derive(Clone, Debug)]
 pub(super) struct Singles {
     primitive: Arc<Primitive>,
     conditions: Vec<Conditions>,
+    /// Time constants τ.
+    taus: Vec<f64>,
     grid: TimeGrid,
 }
 
 impl Singles {
     /// Checks the movements. Without a duration in the grid, all have that of the longest.
     pub(super) fn new(primitive: &Arc<Primitive>, conditions: Vec<Conditions>, grid: TimeGrid) -> Result<Self> {
-        let mut longest = 0.0f64;
+        let (mut longest, mut taus) = (0.0f64, Vec::with_capacity(conditions.len()));
         for one in &conditions {
             one.complete(primitive)?;
-            longest = longest.max(primitive.duration() * one.time_constant(primitive)? / primitive.tau);
+            taus.push(one.time_constant(primitive)?);
+            longest = longest.max(primitive.duration() * taus[taus.len() - 1] / primitive.tau);
         }
         let grid = TimeGrid { duration: grid.duration.or(Some(longest)), ..grid };
-        Ok(Self { primitive: Arc::clone(primitive), conditions, grid })
+        Ok(Self { primitive: Arc::clone(primitive), conditions, taus, grid })
     }
 
     /// Returns the number of samples.
@@ -47,4 +53,47 @@ impl Singles {
         }
         Ok(())
     }
+
+    /// Returns τ of movement `b`, in seconds.
+    pub(super) fn tau(&self, b: usize) -> f64 {
+        self.taus[b]
+    }
+
+    /// Returns whether a movement follows segment durations.
+    pub(super) fn is_warped(&self) -> bool {
+        self.conditions.iter().any(|one| one.segment_durations.as_ref().is_some_and(|durations| durations.len() > 1))
+    }
+
+    /// Returns the products of the movements from `first` on with their cotangents (n, T, D).
+    pub(super) fn products(&self, first: usize, cotangents: &[ArrayView3<f64>], by_tau: bool) -> Result<Vec<Product>> {
+        let cotangents: Vec<_> = cotangents.iter().map(|array| array.as_standard_layout()).collect();
+        let (n, n_samples, n_dofs) = cotangents[0].dim();
+        let length = n_samples * n_dofs;
+        let mut products = Vec::with_capacity(n);
+        for (b, conditions) in self.conditions[first..first + n].iter().enumerate() {
+            let rows: Vec<&[f64]> = cotangents.iter().map(|array| &row_major(array)[b * length..][..length]).collect();
+            let mut product = transposed_rollout::products(&self.primitive, conditions, self.grid, &rows)?;
+            if by_tau {
+                let movement = rollout(&self.primitive, conditions, self.grid)?;
+                let orders = [&movement.position, &movement.velocity, &movement.acceleration].map(row_major);
+                product.scaled_time = scaled_time(&rows, orders, self.grid.dt, n_dofs);
+            }
+            products.push(product);
+        }
+        Ok(products)
+    }
+}
+
+/// Returns Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ + Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩ of a movement with its cotangents.
+fn scaled_time(cotangents: &[&[f64]], orders: [&[f64]; 3], dt: f64, n_dofs: usize) -> f64 {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
+    let mut sum = 0.0;
+    for (k, v) in cotangents.iter().enumerate().take(2) {
+        if k > 0 {
+            sum += k as f64 * dot(orders[k], v);
+        }
+        let samples = v.chunks(n_dofs).zip(orders[k + 1].chunks(n_dofs)).enumerate();
+        sum += samples.fold(0.0, |sum, (t, (v, slope))| sum + t as f64 * dt * dot(slope, v));
+    }
+    sum
 }

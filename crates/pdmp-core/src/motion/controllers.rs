@@ -1,16 +1,15 @@
 //! Many movements of one primitive, stepped together.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
-use crate::motion::command::Motion;
 use crate::motion::commands::{Commands, Motions};
-use crate::motion::controller::steady::{Rows, SteadyMovements};
 use crate::motion::controller::{Controller, Status};
 use crate::motion::limits::Limits;
+use crate::motion::shares::{Part, Shares, is_selected};
+use crate::numerics::threads::Threads;
 use crate::validate::{check_length, check_range};
 
 /// Controllers of B movements of one primitive, with ticks of one length.
@@ -42,10 +41,9 @@ use crate::validate::{check_length, check_range};
 pub struct Controllers {
     /// Commands of all movements, and the state of those that are not steady.
     controllers: Vec<Controller>,
-    steady: SteadyMovements,
+    /// Steady movements.
+    shares: Shares,
     statuses: Vec<Status>,
-    /// Memory for the movements that a tick brings to their end.
-    ending: Vec<u32>,
 }
 
 impl Controllers {
@@ -63,8 +61,45 @@ impl Controllers {
         let controllers = conditions.iter().map(new).collect::<Result<Vec<_>>>()?;
         let n = controllers.len();
         let first = controllers.first().ok_or(Error::Argument { name: "conditions", problem: "must not be empty" })?;
-        let (steady, statuses) = (SteadyMovements::new(first, n), vec![Status::Working; n]);
-        Ok(Self { controllers, steady, statuses, ending: Vec::with_capacity(n) })
+        let (shares, statuses) = (Shares::new(first, n, Threads::ONE), vec![Status::Working; n]);
+        Ok(Self { controllers, shares, statuses })
+    }
+
+    /// Returns the movements with ticks on several threads, which wait for them until the movements are dropped; a copy has
+    /// threads of its own.
+    ///
+    /// The motion is that of one thread, to the bit. A tick neither locks nor allocates. It wakes threads that sleep, by a system
+    /// call: they sleep when no tick has followed for some fifty microseconds. It waits for movements that another thread is
+    /// advancing, and takes all that no other has begun: a thread that the system does not run delays no tick that it has no part
+    /// in. In the child of a fork, the calling thread performs all.
+    ///
+    /// ```
+    /// # use pdmp_core::motion::Controllers;
+    /// # use pdmp_core::numerics::Threads;
+    /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let model = fit(&demos, &FitOptions::new(Kind::Discrete))?;
+    /// let controllers = Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); 4096], None)?;
+    /// let controllers = controllers.with_threads(Threads::new(2)?);
+    /// assert_eq!(controllers.threads().get(), 2);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn with_threads(mut self, threads: Threads) -> Self {
+        for b in 0..self.len() {
+            self.leave(b);
+        }
+        self.shares = Shares::new(&self.controllers[0], self.len(), threads);
+        for (b, controller) in self.controllers.iter().enumerate() {
+            self.shares.admit(b, controller);
+        }
+        self
+    }
+
+    /// Returns the number of threads of a tick.
+    pub fn threads(&self) -> Threads {
+        self.shares.threads()
     }
 
     /// Returns the number B of movements.
@@ -90,7 +125,7 @@ impl Controllers {
 
     /// Returns the number of movements that the next tick advances in compact memory.
     pub fn n_steady(&self) -> usize {
-        self.steady.len()
+        self.shares.n_steady()
     }
 
     /// Performs one tick without new commands of the movements that `mask` (B,) selects, or of all, and writes their motion.
@@ -99,12 +134,14 @@ impl Controllers {
     /// A mask or outputs of a wrong length, or a tick longer than 1000 τ of a movement. No movement is changed then.
     pub fn step(&mut self, mask: Option<&[bool]>, motions: &mut Motions) -> Result<()> {
         self.check(mask, motions)?;
-        for b in self.searched() {
-            if !self.steady.holds(b) && is_selected(mask, b) {
-                self.controllers[b].check_tick_length(self.dt(), None)?;
+        if self.n_steady() < self.len() {
+            for b in 0..self.len() {
+                if !self.shares.holds(b) && is_selected(mask, b) {
+                    self.controllers[b].check_tick_length(self.dt(), None)?;
+                }
             }
         }
-        self.advance(mask, motions, |controller, _| controller.step())
+        self.advance(mask, motions, &|controller, _| controller.step())
     }
 
     /// Performs one tick under commands of the movements that `mask` (B,) selects, or of all, and writes their motion.
@@ -138,7 +175,7 @@ impl Controllers {
             commands.speed.map_or(Ok(()), |speed| controller.check_speed(speed[b]))?;
         }
         for b in selected {
-            if self.steady.holds(b) && self.controllers[b].is_changed_by(&commands.of(b)) {
+            if self.shares.holds(b) && self.controllers[b].is_changed_by(&commands.of(b)) {
                 self.leave(b);
             }
             if let Some(speed) = commands.speed
@@ -148,7 +185,7 @@ impl Controllers {
             }
             self.controllers[b].check_tick_length(self.dt(), commands.of(b).tau)?;
         }
-        self.advance(mask, motions, |controller, b| controller.step_with(&commands.of(b)))
+        self.advance(mask, motions, &|controller, b| controller.step_with(&commands.of(b)))
     }
 
     /// Restarts some movements, each under conditions of its own.
@@ -175,7 +212,7 @@ impl Controllers {
         movements.iter().try_for_each(|&b| self.check_index(b))?;
         conditions.iter().try_for_each(|conditions| conditions.complete(self.primitive()).map(drop))?;
         for (&b, conditions) in movements.iter().zip(conditions) {
-            self.steady.release(b);
+            self.shares.release(b);
             self.controllers[b].reset(conditions)?;
             self.statuses[b] = Status::Working;
         }
@@ -188,8 +225,8 @@ impl Controllers {
     /// A movement that does not exist.
     pub fn get(&mut self, movement: usize) -> Result<&Controller> {
         self.check_index(movement)?;
-        if self.steady.holds(movement) {
-            self.steady.write(movement, &mut self.controllers[movement]);
+        if self.shares.holds(movement) {
+            self.shares.write(movement, &mut self.controllers[movement]);
         }
         Ok(&self.controllers[movement])
     }
@@ -299,9 +336,9 @@ impl Controllers {
 
     /// Makes a controller hold the state of its movement, if that was a steady one.
     fn leave(&mut self, b: usize) {
-        if self.steady.holds(b) {
-            self.steady.write(b, &mut self.controllers[b]);
-            self.steady.release(b);
+        if self.shares.holds(b) {
+            self.shares.write(b, &mut self.controllers[b]);
+            self.shares.release(b);
         }
     }
 
@@ -310,36 +347,10 @@ impl Controllers {
         &mut self,
         mask: Option<&[bool]>,
         motions: &mut Motions,
-        mut tick: impl FnMut(&mut Controller, usize) -> Result<Status>,
+        tick: &(impl Fn(&mut Controller, usize) -> Result<Status> + Sync),
     ) -> Result<()> {
-        let Motions { position, velocity, acceleration } = motions;
-        let mut rows = Rows { position, velocity, acceleration };
-        self.ending.clear();
-        let first = &self.controllers[0];
-        self.steady.step(first.primitive(), first.steady_tick(), mask, &mut rows, &mut self.ending);
-        for i in 0..self.ending.len() {
-            self.leave(self.ending[i] as usize);
-        }
-        let (n_coordinates, n_dofs) = (self.primitive().n_coordinates(), self.primitive().n_dofs());
-        for b in self.searched() {
-            if self.steady.holds(b) || !is_selected(mask, b) {
-                continue;
-            }
-            let controller = &mut self.controllers[b];
-            self.statuses[b] = tick(controller, b)?;
-            controller.read(&mut Motion {
-                position: &mut rows.position[b * n_coordinates..][..n_coordinates],
-                velocity: &mut rows.velocity[b * n_dofs..][..n_dofs],
-                acceleration: &mut rows.acceleration[b * n_dofs..][..n_dofs],
-            });
-            self.steady.admit(b, controller);
-        }
-        Ok(())
-    }
-
-    /// Returns the movements to search for those that are not steady: none if all are.
-    fn searched(&self) -> Range<usize> {
-        0..if self.steady.len() < self.len() { self.len() } else { 0 }
+        let Self { controllers, shares, statuses } = self;
+        shares.advance(Part::new(controllers, statuses, mask, motions), tick)
     }
 
     /// Checks the lengths of a mask and of outputs.
@@ -357,8 +368,4 @@ impl Controllers {
     fn check_index(&self, b: usize) -> Result<()> {
         check_range("movement", b as f64, b < self.len(), "must be less than the number of movements")
     }
-}
-
-fn is_selected(mask: Option<&[bool]>, b: usize) -> bool {
-    mask.is_none_or(|mask| mask[b])
 }

@@ -88,8 +88,8 @@ impl WithRespectTo {
 /// ```
 ///
 /// # Errors
-/// A variable of the other kind of primitive, durations of several segments, conditions or times that do not fit the
-/// primitive, or the error of `progress`.
+/// A variable of the other kind of primitive, durations of several segments, a phase other than 0, conditions or times that
+/// do not fit the primitive, or the error of `progress`.
 pub fn jacobian(
     primitive: &Arc<Primitive>,
     variable: WithRespectTo,
@@ -111,6 +111,12 @@ pub fn jacobian(
     }
     let given = conditions;
     let conditions = given.complete(primitive)?;
+    if conditions.phase > 0.0 {
+        return Err(Error::Argument {
+            name: "phase",
+            problem: "does not apply: Jacobians are those of a movement from phase 0; vector-Jacobian products take it",
+        });
+    }
     let by_goal_velocity = variable == WithRespectTo::GoalVelocity;
     reject_goal_velocity(primitive, by_goal_velocity)?;
     let has_goal_velocity = conditions.has_goal_velocity || by_goal_velocity;

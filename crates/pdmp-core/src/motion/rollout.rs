@@ -118,7 +118,7 @@ fn sample(
 /// Clock of a rollout.
 ///
 /// In warped time u(t) replaces t/τ: the movement is the same function of u, with ẏ = y′u̇ and ÿ = y″u̇² + y′ü.
-enum Clock {
+pub(super) enum Clock {
     /// Time of the controller, in its ticks.
     Linear,
     /// Time of the controller, in ticks of any length; the time after the last one, in seconds.
@@ -134,7 +134,7 @@ enum Clock {
 }
 
 impl Clock {
-    fn of(primitive: &Primitive, conditions: &Conditions) -> Result<Self> {
+    pub(super) fn of(primitive: &Primitive, conditions: &Conditions) -> Result<Self> {
         let Some(segment_durations) =
             conditions.segment_durations.as_ref().filter(|segment_durations| segment_durations.len() > 1)
         else {
@@ -153,39 +153,59 @@ impl Clock {
     }
 
     /// Converts conditions to the time of the controller.
-    fn conditions(&self, conditions: &Conditions) -> Conditions {
+    pub(super) fn conditions(&self, conditions: &Conditions) -> Conditions {
         let mut conditions = conditions.clone();
-        if let Self::Warped { function: warp, extent, phase: [_, rate, _] } = self {
+        if let Self::Warped { .. } = self {
             conditions.segment_durations = None;
-            conditions.velocity.iter_mut().flatten().for_each(|v| *v /= extent * rate);
-            let end_rate = warp.slope(1.0).recip();
-            conditions.goal_velocity.iter_mut().flatten().for_each(|v| *v /= extent * end_rate);
+            let [start, end] = self.velocity_units();
+            conditions.velocity.iter_mut().flatten().for_each(|v| *v /= start);
+            conditions.goal_velocity.iter_mut().flatten().for_each(|v| *v /= end);
         }
         conditions
     }
 
-    /// Advances the controller to a time in seconds.
-    fn step(&mut self, controller: &mut Controller, time: f64) -> Result<()> {
+    /// Returns the seconds of the controller per second at the start, and at the end.
+    pub(super) fn velocity_units(&self) -> [f64; 2] {
         match self {
-            Self::Linear => controller.step(),
-            Self::Unequal { time: before } => {
-                let dt = Some(time - std::mem::replace(before, time));
-                controller.step_with(&Command { dt, ..Command::default() })
-            }
+            Self::Warped { function, extent, phase: [_, rate, _] } => [extent * rate, extent / function.slope(1.0)],
+            _ => [1.0; 2],
+        }
+    }
+
+    /// Advances the clock to a time in seconds, and returns the length of the tick, `None` for that of the controller.
+    pub(super) fn tick(&mut self, time: f64) -> Option<f64> {
+        match self {
+            Self::Linear => None,
+            Self::Unequal { time: before } => Some(time - std::mem::replace(before, time)),
             Self::Warped { function, extent, phase } => {
                 let before = phase[0];
                 *phase = function.phase(time);
-                let dt = Some((phase[0] - before) * *extent);
-                controller.step_with(&Command { dt, ..Command::default() })
+                Some((phase[0] - before) * *extent)
             }
+        }
+    }
+
+    /// Advances the controller to a time in seconds.
+    fn step(&mut self, controller: &mut Controller, time: f64) -> Result<()> {
+        match self.tick(time) {
+            None => controller.step(),
+            dt => controller.step_with(&Command { dt, ..Command::default() }),
         }
         .map(drop)
     }
 
+    /// Returns the seconds of the controller per second, and their derivative with respect to time.
+    pub(super) fn speed(&self) -> [f64; 2] {
+        match self {
+            Self::Warped { extent, phase: [_, rate, rate_change], .. } => [extent * rate, extent * rate_change],
+            _ => [1.0, 0.0],
+        }
+    }
+
     /// Converts velocity and acceleration from the time of the controller to warped time.
     fn rescale(&self, motion: &mut Motion) {
-        if let Self::Warped { extent, phase: [_, rate, rate_change], .. } = self {
-            let (speed, change) = (extent * rate, extent * rate_change);
+        if let Self::Warped { .. } = self {
+            let [speed, change] = self.speed();
             for (velocity, acceleration) in motion.velocity.iter_mut().zip(motion.acceleration.iter_mut()) {
                 *acceleration = *acceleration * speed * speed + *velocity * change;
                 *velocity *= speed;

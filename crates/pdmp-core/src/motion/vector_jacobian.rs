@@ -10,6 +10,8 @@
 //! ```
 //!
 //! with the unit responses of `unit_responses`. The loops are those of `superposition`, transposed: no Jacobian is formed.
+//! Movements that differ in τ, in phase or in segment durations have no responses in common; the products of each are those of
+//! `transposed_rollout`.
 
 use std::ops::Range;
 
@@ -19,13 +21,12 @@ use crate::error::{Error, Result};
 use crate::model::responses::Derivative;
 use crate::motion::batch::{BLOCK, Batch, MIN_MOVEMENTS_PER_BLOCK, PROGRESS_INTERVAL};
 use crate::motion::batch_conditions::PerMovement;
+use crate::motion::batch_singles::Singles;
 use crate::motion::jacobian::WithRespectTo;
+use crate::motion::response_products::{Product, timed_dot};
 use crate::motion::superposition::{Combination, Tile, tile_size};
 use crate::numerics::threads::Threads;
 use crate::validate::{row_major, zeros};
-
-/// Number of partial sums of an inner product, which fill vector registers.
-const LANES: usize = 4;
 
 impl Batch {
     /// Computes the gradients of a function L of the movements of a range with respect to their conditions.
@@ -63,8 +64,8 @@ impl Batch {
     ///
     /// # Errors
     /// A range beyond the batch; cotangents of another number or shape, or that are not finite; a variable of the other
-    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations; movements without
-    /// response curves in common; a primitive with rotations; or the error of `progress`.
+    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations or segment durations; a
+    /// primitive with rotations; or the error of `progress`.
     pub fn vector_jacobian(
         &self,
         movements: Range<usize>,
@@ -101,7 +102,11 @@ impl Batch {
             threads.try_for_each(next, |(first, mut outputs)| {
                 let at = first..(first + in_block).min(movements.len());
                 let cotangents: Vec<_> = cotangents.iter().map(|array| array.slice(s![at.clone(), .., ..])).collect();
-                for (i, product) in work.block(movements.start + first, &cotangents).iter().enumerate() {
+                let products = match &self.singles {
+                    Some(singles) => singles.products(movements.start + first, &cotangents, by_tau)?,
+                    None => work.block(movements.start + first, &cotangents),
+                };
+                for (i, product) in products.iter().enumerate() {
                     for (variable, output) in variables.iter().zip(&mut outputs) {
                         self.write_gradient(movements.start + first + i, *variable, product, output.row_mut(i))?;
                     }
@@ -123,9 +128,6 @@ impl Batch {
     ) -> Result<()> {
         let (n_movements, n_samples, n_dofs) = self.shape();
         let wrong = |name, problem| Err(Error::Argument { name, problem });
-        if self.singles.is_some() {
-            return wrong("conditions", "must have one tau, linear time and phase 0 in common: call once for each tau");
-        }
         if self.pose.is_some() {
             return wrong("cotangents", "do not apply to a model with rotations: pass its Jacobians to your framework");
         }
@@ -139,6 +141,12 @@ impl Batch {
         }
         for variable in variables {
             variable.check(self.kind, Derivative::ALL[cotangents.len() - 1])?;
+            if *variable == WithRespectTo::Tau && self.singles.as_ref().is_some_and(Singles::is_warped) {
+                return wrong(
+                    "tau",
+                    "does not apply to movements that follow segment_durations: pass tau in their place",
+                );
+            }
             let (name, given) = match variable {
                 WithRespectTo::Start => ("start", self.starts.is_some()),
                 WithRespectTo::Velocity => ("velocity", self.velocities.is_some()),
@@ -167,7 +175,8 @@ impl Batch {
                 (self.starts.is_some(), Derivative::Position, start),
                 (self.velocities.is_some(), Derivative::Velocity, velocity),
             ] {
-                if given {
+                // The products of movements of a timing of their own are net of both.
+                if given && self.singles.is_none() {
                     let at_start = self.responses.of(derivative).styles[j].row(0);
                     sum -= at_start.iter().zip(products).fold(0.0, |sum, (r, product)| sum + r * product);
                 }
@@ -193,7 +202,8 @@ impl Batch {
             WithRespectTo::GoalVelocity => gradient.assign(&aview1(goal_velocity)),
             WithRespectTo::Tau => {
                 let given = dot(&self.velocities, velocity) + dot(&self.goal_velocities, goal_velocity);
-                gradient[0] = (given - product.scaled_time) / self.tau;
+                let tau = self.singles.as_ref().map_or(self.tau, |singles| singles.tau(b));
+                gradient[0] = (given - product.scaled_time) / tau;
             }
         }
         if gradient.iter().all(|value| value.is_finite()) {
@@ -202,105 +212,6 @@ impl Batch {
         let problem = "must be finite, and so small that the gradients do not overflow";
         Err(Error::Argument { name: "cotangents", problem })
     }
-}
-
-/// Inner products ⟨v, ·⟩ of the cotangents of one movement with the unit responses.
-#[derive(Clone, Debug)]
-struct Product {
-    /// Those with the styles (J,), summed over the DoFs.
-    styles: Vec<f64>,
-    /// c, e, n and q (D,); in sums over tiles, of each coefficient of a [`Combination`].
-    centre: Vec<f64>,
-    start: Vec<f64>,
-    velocity: Vec<f64>,
-    goal_velocity: Vec<f64>,
-    /// Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ + Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩, if τ is a variable.
-    scaled_time: f64,
-}
-
-impl Product {
-    fn zeros(n_styles: usize, n: usize) -> Self {
-        let [centre, start, velocity, goal_velocity] = [(); 4].map(|()| vec![0.0; n]);
-        Self { styles: vec![0.0; n_styles], centre, start, velocity, goal_velocity, scaled_time: 0.0 }
-    }
-
-    /// Returns ⟨v, y⟩ for the velocities or accelerations of a combination.
-    fn with(&self, combination: &Combination) -> f64 {
-        let Combination { style, start, velocity, goal_velocity, .. } = combination;
-        let last = goal_velocity.as_ref().map_or(0.0, |velocity| dot(&self.goal_velocity, velocity));
-        dot(&self.styles, style) + dot(&self.start, start) + dot(&self.velocity, velocity) + last
-    }
-
-    /// Adds the products of a tile with the cotangents `v`.
-    fn add(&mut self, tile: &Tile, v: &[f64], is_position: bool, has_velocity: bool) {
-        let period = self.start.len();
-        if is_position {
-            v.chunks(period).for_each(|v| self.centre.iter_mut().zip(v).for_each(|(sum, v)| *sum += v));
-        }
-        let goal_velocity = tile.goal_velocity.map(|responses| (&mut self.goal_velocity, responses));
-        let velocity = has_velocity.then_some((&mut self.velocity, tile.velocity));
-        for (sums, responses) in [Some((&mut self.start, tile.start)), velocity, goal_velocity].into_iter().flatten() {
-            for (v, responses) in v.chunks(period).zip(responses.chunks(period)) {
-                sums.iter_mut().zip(v).zip(responses).for_each(|((sum, v), response)| *sum += v * response);
-            }
-        }
-        for (sums, curves) in self.styles.chunks_mut(3).zip(tile.styles.chunks(3)) {
-            let products: [f64; 3] = match *curves {
-                [r, s, t] => dots([r, s, t], v),
-                [r, s] => {
-                    let [r, s] = dots([r, s], v);
-                    [r, s, 0.0]
-                }
-                _ => [dot(curves[0], v), 0.0, 0.0],
-            };
-            sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
-        }
-    }
-
-    /// Adds the products of another order.
-    fn add_all(&mut self, other: &Self) {
-        let Self { styles, centre, start, velocity, goal_velocity, scaled_time } = self;
-        let pairs = [
-            (styles, &other.styles),
-            (centre, &other.centre),
-            (start, &other.start),
-            (velocity, &other.velocity),
-            (goal_velocity, &other.goal_velocity),
-        ];
-        for (sums, products) in pairs {
-            sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
-        }
-        *scaled_time += other.scaled_time;
-    }
-
-    /// Returns the products of `n_dofs` DoFs, from those of their repeated coefficients.
-    fn folded(&self, n_dofs: usize) -> Self {
-        let fold = |sums: &Vec<f64>| (0..n_dofs).map(|d| sums[d..].iter().step_by(n_dofs).sum()).collect();
-        let Self { styles, centre, start, velocity, goal_velocity, scaled_time } = self;
-        let [centre, start, velocity, goal_velocity] = [centre, start, velocity, goal_velocity].map(fold);
-        Self { styles: styles.clone(), centre, start, velocity, goal_velocity, scaled_time: *scaled_time }
-    }
-}
-
-/// Returns inner products with the same vector.
-#[inline(always)]
-fn dots<const N: usize>(curves: [&[f64]; N], v: &[f64]) -> [f64; N] {
-    let mut sums = [[0.0; LANES]; N];
-    let whole = v.len() - v.len() % LANES;
-    let curves = curves.map(|curve| &curve[..v.len()]);
-    for at in (0..whole).step_by(LANES) {
-        for (sums, curve) in sums.iter_mut().zip(curves) {
-            for lane in 0..LANES {
-                sums[lane] += curve[at + lane] * v[at + lane];
-            }
-        }
-    }
-    std::array::from_fn(|j| (whole..v.len()).fold(sums[j].iter().sum(), |sum, i| sum + curves[j][i] * v[i]))
-}
-
-fn dot(curve: &[f64], v: &[f64]) -> f64 {
-    let [product] = dots([curve], v);
-    product
 }
 
 /// Settings of the products of all blocks.
@@ -339,8 +250,7 @@ impl Contraction<'_> {
                     if let Some(slope) = &slope {
                         let slopes = &mut buffer[..at.len()];
                         slope.sum(combination, &zeros, slopes);
-                        slopes.iter_mut().zip(&self.time[at.clone()]).for_each(|(slope, time)| *slope *= time);
-                        product.scaled_time += dot(slopes, v);
+                        product.scaled_time += timed_dot(slopes, v, &self.time[at.clone()]);
                     }
                 }
             }

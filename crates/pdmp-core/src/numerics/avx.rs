@@ -8,15 +8,18 @@
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::{
-    __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _mm_cvtsd_f64, _mm_min_pd, _mm_min_sd, _mm_unpackhi_pd, _mm256_add_pd,
+    __m256d, __m512d, _CMP_LE_OQ, _CMP_LT_OQ, _mm_cvtsd_f64, _mm_min_pd, _mm_min_sd, _mm_unpackhi_pd, _mm256_add_pd,
     _mm256_and_pd, _mm256_andnot_pd, _mm256_castpd256_pd128, _mm256_cmp_pd, _mm256_div_pd, _mm256_extractf128_pd,
     _mm256_load_pd, _mm256_loadu_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
     _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_store_pd, _mm256_storeu_pd,
-    _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd, _mm256_xor_pd,
+    _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd, _mm256_xor_pd, _mm512_add_pd, _mm512_castpd256_pd512,
+    _mm512_castpd512_pd256, _mm512_extractf64x4_pd, _mm512_insertf64x4, _mm512_load_pd, _mm512_mul_pd, _mm512_set1_pd,
+    _mm512_setzero_pd, _mm512_store_pd, _mm512_storeu_pd, _mm512_sub_pd,
 };
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
-use super::simd::{F64x4, Kernel, Real, Register, WIDTH};
+use super::blocks::{Block, BlockKernel, Line, blocks_of_one_group};
+use super::simd::{F64x4, Kernel, Real, Register, WIDTH, unpad};
 
 /// Computes a formula.
 ///
@@ -36,6 +39,33 @@ pub(super) unsafe fn compute_by_more_registers<K: Kernel>(kernel: K) -> K::Outpu
     kernel.run::<Avx2>()
 }
 
+/// Computes a formula of blocks of one group.
+///
+/// # Safety
+/// The processor has AVX2.
+#[target_feature(enable = "avx2")]
+pub(super) unsafe fn compute_blocks<K: BlockKernel>(kernel: K) {
+    kernel.run::<Avx2>();
+}
+
+/// Computes a formula of blocks of one group, with the registers of [`compute_by_more_registers`].
+///
+/// # Safety
+/// The processor has AVX2 and the 256-bit instructions of AVX-512.
+#[target_feature(enable = "avx2,avx512f,avx512vl")]
+pub(super) unsafe fn compute_blocks_by_more_registers<K: BlockKernel>(kernel: K) {
+    kernel.run::<Avx2>();
+}
+
+/// Computes a formula of blocks of two groups.
+///
+/// # Safety
+/// The processor has AVX2, AVX-512F and the 256-bit instructions of AVX-512.
+#[target_feature(enable = "avx2,avx512f,avx512vl")]
+pub(super) unsafe fn compute_pairs<K: BlockKernel>(kernel: K) {
+    kernel.run::<Avx512>();
+}
+
 /// Register of four DoFs. Only the functions above instantiate it, which run only on processors with AVX2.
 #[derive(Clone, Copy)]
 struct Avx2(__m256d);
@@ -48,10 +78,87 @@ impl Default for Avx2 {
     }
 }
 
+blocks_of_one_group!(Avx2);
+
+/// Register of eight DoFs, which only [`compute_pairs`] instantiates.
+#[derive(Clone, Copy)]
+struct Avx512(__m512d);
+
+impl Default for Avx512 {
+    #[inline(always)]
+    fn default() -> Self {
+        // SAFETY: values of this type exist only inside `compute_pairs`, so the processor has AVX-512F.
+        Self(unsafe { _mm512_setzero_pd() })
+    }
+}
+
+impl Mul<f64> for Avx512 {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, factor: f64) -> Self {
+        // SAFETY: see `default`.
+        Self(unsafe { _mm512_mul_pd(self.0, _mm512_set1_pd(factor)) })
+    }
+}
+
+impl Real for Avx512 {}
+
+impl Block for Avx512 {
+    const GROUPS: usize = 2;
+
+    #[inline(always)]
+    fn load(line: &Line, _: usize) -> Self {
+        // SAFETY: see `default`. A `Line` is eight doubles, aligned to 64 bytes, and the reference makes them readable.
+        Self(unsafe { _mm512_load_pd(std::ptr::from_ref(line).cast()) })
+    }
+
+    #[inline(always)]
+    fn store(self, line: &mut Line, _: usize) {
+        // SAFETY: see `load`. The exclusive reference makes them writable.
+        unsafe { _mm512_store_pd(std::ptr::from_mut(line).cast(), self.0) };
+    }
+
+    #[inline(always)]
+    fn join(first: &F64x4, second: &F64x4) -> Self {
+        let (first, second): (Avx2, Avx2) = (Register::load(first), Register::load(second));
+        // SAFETY: see `default`.
+        Self(unsafe { _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(first.0), second.0) })
+    }
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        // SAFETY: see `default`.
+        Self(unsafe { _mm512_set1_pd(value) })
+    }
+
+    #[inline(always)]
+    fn write(self, numbers: &mut [f64]) {
+        // SAFETY: see `default`.
+        let first = Avx2(unsafe { _mm512_castpd512_pd256(self.0) });
+        // SAFETY: see `default`.
+        let second = Avx2(unsafe { _mm512_extractf64x4_pd::<1>(self.0) });
+        if let Some((four, rest)) = numbers.split_first_chunk_mut() {
+            first.store_numbers(four);
+            unpad(Register::store(second), rest);
+        } else {
+            unpad(Register::store(first), numbers);
+        }
+    }
+
+    #[inline(always)]
+    fn write_all(self, numbers: &mut [f64]) {
+        if let Some(eight) = numbers.first_chunk_mut::<8>() {
+            // SAFETY: see `default`. The exclusive reference makes eight doubles writable, and they need no alignment.
+            unsafe { _mm512_storeu_pd(eight.as_mut_ptr(), self.0) };
+        }
+    }
+}
+
 /// Implements operators by intrinsics.
 macro_rules! operators {
-    ($($operator:ident $function:ident $intrinsic:ident,)+) => {
-        $(impl $operator for Avx2 {
+    ($register:ident: $($operator:ident $function:ident $intrinsic:ident,)+) => {
+        $(impl $operator for $register {
             type Output = Self;
 
             #[inline(always)]
@@ -64,6 +171,13 @@ macro_rules! operators {
 }
 
 operators! {
+    Avx512:
+    Add add _mm512_add_pd,
+    Sub sub _mm512_sub_pd,
+}
+
+operators! {
+    Avx2:
     Add add _mm256_add_pd,
     Sub sub _mm256_sub_pd,
     Mul mul _mm256_mul_pd,

@@ -2,9 +2,11 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+pub(crate) mod blocks;
 pub(crate) mod linear_algebra;
 pub(crate) mod matern;
 pub(crate) mod orthonormal_span;
+pub(crate) mod pool;
 pub(crate) mod rotation;
 #[cfg(test)]
 pub(crate) mod runge_kutta;

@@ -195,7 +195,7 @@ fn compute_portable<K: Kernel>(kernel: K) -> K::Output {
 /// Adding and subtracting `rest` leaves larger values unchanged to 16 digits and rounds values below 1e-16·`rest` to zero.
 /// Products of such values would become subnormal numbers, which are slow.
 #[inline(always)]
-pub(crate) fn flush<T: Register>(value: T, rest: T) -> T {
+pub(crate) fn flush<T: Real>(value: T, rest: T) -> T {
     (value + rest) - rest
 }
 
@@ -299,6 +299,7 @@ fn dof_range(n: usize, group: usize) -> Range<usize> {
 }
 
 /// Returns the first `n` elements of groups.
+#[inline(always)]
 pub(crate) fn unpack(lanes: &[F64x4], n: usize) -> &[f64] {
     &bytemuck::cast_slice(lanes)[..n]
 }

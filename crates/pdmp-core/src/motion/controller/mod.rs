@@ -30,6 +30,7 @@ mod snapshot;
 mod start;
 pub(in crate::motion) mod steady;
 mod step;
+pub(in crate::motion) mod substeps;
 mod synchronous;
 mod turning;
 
@@ -54,9 +55,8 @@ use governor::Governor;
 use group::Group;
 use limiter::Limiter;
 use pose::Pose;
+use substeps::max_clock_step;
 
-/// Maximum clock step of a substep, relative to the extent of the movement.
-const MAX_CLOCK_STEP: f64 = 1.0 / 500.0;
 /// Default tolerance of a settled movement, relative to the range of each DoF. On the recordings of `docs/transport.md`,
 /// movements settle to it within 1.0 to 1.3 durations (medians), to 1e-3 within up to 1.5.
 const DEFAULT_TOLERANCE: f64 = 5e-3;
@@ -237,8 +237,7 @@ impl Controller {
         let command_gains = rate_gains.on_clock(primitive.tau());
         let groups = Group::all(primitive.ranges());
         let zeros = vec![F64x4::ZERO; groups.len()];
-        // The margin keeps a tick of exactly this length in one step.
-        let max_clock_step = MAX_CLOCK_STEP * primitive.canonical().extent() * (1.0 + 1e-9);
+        let max_clock_step = max_clock_step(primitive);
         let series = Series::new(primitive.attractor(), max_clock_step);
         let mut controller = Self {
             dt,

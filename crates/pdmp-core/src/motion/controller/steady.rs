@@ -8,46 +8,62 @@
 mod tick;
 
 use super::group::add_frame_motion;
-use super::step::{MAX_SUBSTEPS, ROUNDING, first_element};
+use super::step::first_element;
+use super::substeps::{MAX_SUBSTEPS, ROUNDING};
 use super::{Controller, Status};
-use crate::dynamics::canonical::{Canonical, CompensatedSum};
+use crate::dynamics::canonical::{Canonical, CompensatedSums};
 use crate::dynamics::forcing_table::TableIndex;
 use crate::dynamics::output_system::{CubicSample, Propagator, State};
 use crate::dynamics::transport::TransportSample;
 use crate::model::primitive::Primitive;
 use crate::motion::command::Command;
-use crate::numerics::simd::{F64x4, compute_many, groups};
+use crate::numerics::blocks::{Block, Line, compute_blocks};
+use crate::numerics::simd::{F64x4, groups};
 use tick::Steps;
 
-/// Clock and scalar state of a movement, in one line of the cache.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-struct SteadyClock {
-    time: CompensatedSum,
-    clock: CompensatedSum,
+/// Clocks and scalar state of the movements.
+#[derive(Clone, Debug)]
+struct SteadyClocks {
+    time: CompensatedSums,
+    clock: CompensatedSums,
     /// ρ.
-    rate: f64,
+    rate: Vec<f64>,
     /// Clock interval of a substep.
-    h: f64,
+    h: Vec<f64>,
     /// Lag ℓ of the frame at the clock.
-    lag: f64,
+    lag: Vec<f64>,
     /// Place whose propagator the movement uses: an earlier movement of the same rate, or itself.
-    propagator: u32,
+    propagator: Vec<u32>,
     /// Cell of the transport profile.
-    cell: u16,
+    cell: Vec<u16>,
     /// Number of substeps of a tick.
-    n_substeps: u16,
+    n_substeps: Vec<u16>,
 }
 
-/// State and commands of a group of DoFs.
+impl SteadyClocks {
+    fn new(n: usize) -> Self {
+        let numbers = || vec![0.0; n];
+        Self {
+            time: CompensatedSums::zeros(n),
+            clock: CompensatedSums::zeros(n),
+            rate: numbers(),
+            h: numbers(),
+            lag: numbers(),
+            propagator: vec![0; n],
+            cell: vec![0; n],
+            n_substeps: vec![1; n],
+        }
+    }
+}
+
+/// State and commands of two groups of DoFs, the second of which may be unused.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(64))]
-struct SteadyGroup {
-    position: F64x4,
-    z: F64x4,
-    w: CubicSample<F64x4>,
-    centre: F64x4,
-    displacement: F64x4,
+struct SteadyPair {
+    position: Line,
+    z: Line,
+    w: CubicSample<Line>,
+    centre: Line,
+    displacement: Line,
 }
 
 /// Output of many movements, by rows (B, D) of the caller.
@@ -73,7 +89,7 @@ pub(in crate::motion) struct SteadyMovements {
     is_steady: Vec<bool>,
     /// Number of movements.
     n_steady: usize,
-    clocks: Vec<SteadyClock>,
+    clocks: SteadyClocks,
     /// Amplitudes r, and their commands r₀.
     amplitudes: Vec<[f64; 2]>,
     propagators: Vec<Propagator>,
@@ -81,7 +97,8 @@ pub(in crate::motion) struct SteadyMovements {
     n_users: Vec<u32>,
     /// Place of the propagator that was used last.
     last_propagator: usize,
-    groups: Vec<SteadyGroup>,
+    /// By movements and pairs of groups.
+    pairs: Vec<SteadyPair>,
     styles: Vec<F64x4>,
 }
 
@@ -143,21 +160,17 @@ impl SteadyMovements {
     /// Returns `n` empty places.
     pub(in crate::motion) fn new(controller: &Controller, n: usize) -> Self {
         let (n_groups, n_style_groups) = (controller.groups.len(), groups(controller.primitive.n_styles()));
-        let (time, clock) = (CompensatedSum::default(), CompensatedSum::default());
         Self {
             n_groups,
             n_style_groups,
             is_steady: vec![false; n],
             n_steady: 0,
-            clocks: vec![
-                SteadyClock { time, clock, rate: 0.0, h: 0.0, lag: 0.0, propagator: 0, cell: 0, n_substeps: 1 };
-                n
-            ],
+            clocks: SteadyClocks::new(n),
             amplitudes: vec![[1.0; 2]; n],
             propagators: vec![controller.propagator; n],
             n_users: vec![0; n],
             last_propagator: 0,
-            groups: vec![SteadyGroup::default(); n * n_groups],
+            pairs: vec![SteadyPair::default(); n * n_groups.div_ceil(2)],
             styles: vec![F64x4::ZERO; n * n_style_groups],
         }
     }
@@ -179,23 +192,27 @@ impl SteadyMovements {
         }
         (self.is_steady[place], self.n_steady) = (true, self.n_steady + 1);
         self.amplitudes[place] = [controller.r, first_element(controller.amplitude.value())];
-        self.clocks[place] = SteadyClock {
-            time: controller.time,
-            clock: controller.clock,
-            rate: first_element(controller.rate.value()),
-            h: controller.propagator.step(),
-            lag: controller.frame_lag,
-            propagator: self.last_propagator as u32,
-            // Both have far smaller bounds: the cells of a profile, and the substeps of a tick.
-            cell: controller.primitive.transport.cell(&controller.transport_segment) as u16,
-            n_substeps: controller.steady_substeps() as u16,
-        };
+        let clocks = &mut self.clocks;
+        clocks.time.set(place, controller.time);
+        clocks.clock.set(place, controller.clock);
+        clocks.rate[place] = first_element(controller.rate.value());
+        clocks.h[place] = controller.propagator.step();
+        clocks.lag[place] = controller.frame_lag;
+        clocks.propagator[place] = self.last_propagator as u32;
+        // Both have far smaller bounds: the cells of a profile, and the substeps of a tick.
+        clocks.cell[place] = controller.primitive.transport.cell(&controller.transport_segment) as u16;
+        clocks.n_substeps[place] = controller.steady_substeps() as u16;
         let styles = &mut self.styles[place * self.n_style_groups..][..self.n_style_groups];
         styles.copy_from_slice(controller.style.value());
-        let places = &mut self.groups[place * self.n_groups..][..self.n_groups];
-        for (index, (to, group)) in places.iter_mut().zip(&controller.groups).enumerate() {
-            let (position, centre) = (controller.position[index], controller.centre.value()[index]);
-            *to = SteadyGroup { position, z: group.z, w: group.w, centre, displacement: group.displacement };
+        let n_pairs = self.n_groups.div_ceil(2);
+        for (index, group) in controller.groups.iter().enumerate() {
+            let pair = &mut self.pairs[place * n_pairs + index / 2];
+            Block::store(controller.position[index], &mut pair.position, index);
+            Block::store(group.z, &mut pair.z, index);
+            Block::store(group.w.value, &mut pair.w.value, index);
+            Block::store(group.w.slope, &mut pair.w.slope, index);
+            Block::store(controller.centre.value()[index], &mut pair.centre, index);
+            Block::store(group.displacement, &mut pair.displacement, index);
         }
     }
 
@@ -217,21 +234,26 @@ impl SteadyMovements {
     pub(in crate::motion) fn release(&mut self, place: usize) {
         if std::mem::take(&mut self.is_steady[place]) {
             self.n_steady -= 1;
-            self.n_users[self.clocks[place].propagator as usize] -= 1;
+            self.n_users[self.clocks.propagator[place] as usize] -= 1;
         }
     }
 
     /// Writes the state of a movement to its controller, whose commands are those of the movement.
     pub(in crate::motion) fn write(&self, place: usize, controller: &mut Controller) {
-        let (SteadyClock { time, clock, lag, cell, .. }, [r, _]) = (self.clocks[place], self.amplitudes[place]);
+        let (clocks, [r, _]) = (&self.clocks, self.amplitudes[place]);
+        let (time, clock) = (clocks.time.get(place), clocks.clock.get(place));
+        let (lag, cell) = (clocks.lag[place], clocks.cell[place]);
         (controller.time, controller.clock, controller.r, controller.frame_lag) = (time, clock, r, lag);
         controller.transport_segment = controller.primitive.transport.segment_of_cell(usize::from(cell));
         controller.read_forcing();
         let (gate, attractor) = (controller.gate(), controller.primitive.attractor());
         let TransportSample { slope, bend, .. } = controller.transport_segment.lag(clock.value());
-        let states = &self.groups[place * self.n_groups..][..self.n_groups];
-        for (index, (group, state)) in controller.groups.iter_mut().zip(states).enumerate() {
-            let SteadyGroup { position, z, w, centre, displacement } = *state;
+        let n_pairs = self.n_groups.div_ceil(2);
+        for (index, group) in controller.groups.iter_mut().enumerate() {
+            let SteadyPair { position, z, w, centre, displacement } = &self.pairs[place * n_pairs + index / 2];
+            let [position, z, centre, displacement] =
+                [position, z, centre, displacement].map(|line| <F64x4 as Block>::load(line, index));
+            let w = CubicSample { value: Block::load(&w.value, index), slope: Block::load(&w.slope, index) };
             (group.z, group.w) = (z, w);
             let state = State { e: position - (centre + displacement * lag), z };
             let w = add_frame_motion(w, displacement, [slope, bend]);
@@ -250,6 +272,8 @@ impl SteadyMovements {
         rows: &mut Rows,
         ending: &mut Vec<u32>,
     ) {
-        compute_many(Steps { movements: self, primitive, tick, mask, rows, ending, last: TableIndex::default() });
+        let n_groups = self.n_groups;
+        let last = TableIndex::default();
+        compute_blocks(Steps { movements: self, primitive, tick, mask, rows, ending, last }, n_groups);
     }
 }

@@ -1,6 +1,7 @@
 //! One tick of the control loop.
 
 use super::group::{ForcingSample, Gate, Group, add_frame_motion};
+use super::substeps::{MAX_SUBSTEPS, ROUNDING};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSum, amplitude, faded};
 use crate::dynamics::forcing_table::Fade;
@@ -10,12 +11,8 @@ use crate::error::{Error, Result};
 use crate::motion::perturbation::PerturbationTerms;
 use crate::numerics::simd::{F64x4, Kernel, Register, compute, flush, unpack};
 
-/// Maximum number of substeps of a tick. A tick that needs more is still stable, but less accurate.
-pub(super) const MAX_SUBSTEPS: f64 = 1000.0;
 /// Maximum length of a tick, in units of τ.
 const MAX_TICK: f64 = 1000.0;
-/// Relative rounding error of a substep that ends at u_end.
-pub(super) const ROUNDING: f64 = 1e-9;
 
 impl Controller {
     /// Checks that a tick is not too long for the present rate and the commanded one.
