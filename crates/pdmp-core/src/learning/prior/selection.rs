@@ -28,7 +28,8 @@ pub(super) fn candidates() -> impl Iterator<Item = Settings> {
 }
 
 /// Returns the correlation time and the candidate with the smallest error of the rest, by the geometric mean over the
-/// shares seen.
+/// shares seen. Chosen by the predictive log score instead, the errors on six sets of recordings were 1 to 8 % larger, with
+/// bands that cover as much.
 pub(super) fn best(errors: &[SimulatedErrors]) -> (f64, Settings) {
     let mut best =
         (f64::INFINITY, CORRELATION_TIMES[0], Settings { bandwidth: 1.0, tempering: 1.0, correlation_time: 1.0 });
