@@ -1936,6 +1936,7 @@ class Model:
         self,
         prior: Prior,
         *,
+        context: _Context | None = None,  # (Q,)
         starts: tuple[float, float] | None = None,
         duration: float | None = None,
     ) -> Recogniser:
