@@ -66,4 +66,10 @@ impl Recording {
     pub(super) fn samples(&self) -> impl Iterator<Item = (f64, Vec<f64>)> + '_ {
         self.time.iter().zip(self.position.rows()).map(|(time, row)| (*time, row.to_vec()))
     }
+    /// Returns the samples from one on: to the end of a movement, or of a cycle, which repeats, for a period.
+    pub(super) fn rest(&self, seen: usize) -> Vec<(f64, Vec<f64>)> {
+        let next = self.samples().map(|(time, position)| (time + self.duration, position));
+        let n_again = if self.kind == Kind::Rhythmic { seen } else { 0 };
+        self.samples().skip(seen).chain(next.take(n_again)).collect()
+    }
 }

@@ -199,7 +199,7 @@ fn watch(
             recogniser.update(samples[seen].0, &samples[seen].1)?;
             seen += 1;
         }
-        compare(recogniser, share, &samples[seen..])?;
+        compare(recogniser, share, &recording.rest(seen))?;
     }
     Ok(())
 }
