@@ -140,7 +140,8 @@ install: | needs  ## Installs the libraries for C and C++, headers, and files fo
 
 packages: .venv/with-packages  ## Builds wheel, source distribution and crate, checks them, and puts those for pip into dist/python/
 	rm -rf dist/python
-	$(BIN)/maturin build --quiet --release --compression-level 9 --out dist/python
+	$(BIN)/maturin build --quiet --release --out dist/python
+	$(BIN)/python .ci/recompress.py dist/python
 	$(BIN)/maturin sdist --out dist/python
 	$(BIN)/python .ci/packages.py
 
