@@ -1,4 +1,4 @@
-"""Compresses the wheels of a folder anew by Zopfli: 3 % smaller, and read as before."""
+"""Compresses the wheels of a folder by Zopfli instead: 3 % smaller, and read as before."""
 
 import sys
 import zipfile
