@@ -1,6 +1,7 @@
 """Movements that are shown in part, and simple predictors of their rest."""
 
 from collections.abc import Iterator, Sequence
+from time import perf_counter
 
 import numpy as np
 
@@ -10,7 +11,33 @@ from report.promp import ProMP
 
 SHARES = (0.1, 0.3, 0.5, 0.7)
 MAX_FOLDS = 10
+BAND = 1.6449  # half-width of a band of 90 %, in standard deviations
 PHASES = np.linspace(0, 1, 201)
+
+
+def folds(n_demos: int, groups: Sequence[str] | None) -> list[list[int]]:
+    """Returns the demonstrations to leave out together: tenths, or those of each group."""
+    if groups is not None:
+        return [
+            [m for m, group in enumerate(groups) if group == name] for name in sorted({*groups})
+        ]
+    n = min(MAX_FOLDS, n_demos)
+    return [list(range(first, n_demos, n)) for first in range(n)]
+
+
+def times(recogniser: pdmp.Recogniser, demos: list[Demonstration]) -> tuple[float, float]:
+    """Returns the median times of a sample and of an estimate in µs."""
+    updates, estimates = [], []
+    for demo in demos:
+        recogniser.reset()
+        for time, position in zip(demo.time[:80], demo.position, strict=False):
+            begin = perf_counter()
+            recogniser.update(time, position)
+            middle = perf_counter()
+            recogniser.estimate()
+            updates.append(middle - begin)
+            estimates.append(perf_counter() - middle)
+    return 1e6 * float(np.median(updates)), 1e6 * float(np.median(estimates))
 
 
 def sampled(demo: Demonstration) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,6 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
@@ -17,12 +16,12 @@ from pdmp._native import from_tangent, mean_positions, to_tangent
 from pdmp.datasets import folder
 from pdmp.preprocessing import matrices_to_quaternions, rotation_vectors_to_quaternions
 from recordings import ARM, is_available, recorded, rows
-from report.observed import MAX_FOLDS, PHASES, SHARES, Simple, at, resampled, sampled, shown
+from report import observed
+from report.observed import BAND, PHASES, SHARES, Simple, at, resampled, sampled, shown
 from report.sets import numbers
 
 ROTATIONS = {3: "wxyz"}
 UNITS = ["m", "m", "m", "", "", "", ""]
-BAND = 1.6449  # half-width of a band of 90 %, in standard deviations
 PARTS = (slice(0, 3), slice(3, 6))
 NEAREST, MEAN = "nearest, true time", "mean"
 NAMES = (
@@ -43,14 +42,6 @@ class Poses:
     name: str
     demos: list[Demonstration]
     groups: list[str] | None
-
-    def folds(self, by_group: bool) -> list[list[int]]:
-        """Returns the demonstrations to leave out together."""
-        if by_group and self.groups is not None:
-            names = sorted(set(self.groups))
-            return [[m for m, group in enumerate(self.groups) if group == name] for name in names]
-        n = min(MAX_FOLDS, len(self.demos))
-        return [list(range(first, len(self.demos), n)) for first in range(n)]
 
 
 def sets() -> Iterator[Poses]:
@@ -178,7 +169,8 @@ class Scores:
 
 def evaluated(poses: Poses, by_group: bool, most: int) -> Scores:
     """Recognises held-out movements with models and priors of the others."""
-    found, folds = [], poses.folds(by_group)
+    found = []
+    folds = observed.folds(len(poses.demos), poses.groups if by_group else None)
     for fold in folds:
         training = [m for m in range(len(poses.demos)) if m not in fold]
         demos = [poses.demos[m] for m in training]
@@ -289,17 +281,7 @@ def times() -> str:
         demos.append(Demonstration(pose, dt=dt, rotations=ROTATIONS, units=UNITS))
     model = pdmp.fit(demos, n_styles=6)
     recogniser = model.recogniser(model.prior(demos))
-    updates, estimates = [], []
-    for demo in demos:
-        recogniser.reset()
-        for time, position in zip(demo.time[:80], demo.position, strict=False):
-            begin = perf_counter()
-            recogniser.update(time, position)
-            middle = perf_counter()
-            recogniser.estimate()
-            updates.append(middle - begin)
-            estimates.append(perf_counter() - middle)
-    sample, estimate = (1e6 * np.median(each) for each in (updates, estimates))
+    sample, estimate = observed.times(recogniser, demos)
     return (
         f"A sample of a pose with 6 styles and {recogniser.n_hypotheses} hypotheses takes "
         f"{sample:.0f} µs, an estimate {estimate:.0f} µs (medians).\n"

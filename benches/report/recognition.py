@@ -8,7 +8,6 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
@@ -16,12 +15,11 @@ import pdmp
 from pdmp import Demonstration
 from pdmp._markdown import markdown_table
 from recordings import ARM, HAND, is_available, recorded, rows
-from report import partners, pauses, poses, walks
-from report.observed import MAX_FOLDS, SHARES, Simple, sampled, shown
+from report import observed, partners, pauses, poses, walks
+from report.observed import BAND, SHARES, Simple, sampled, shown
 from report.sets import cut, numbers
 
 ROOT = Path(__file__).resolve().parents[2]
-BAND = 1.6449  # half-width of a band of 90 %, in standard deviations
 RECOGNISER, GIVEN = "recogniser", "recogniser, context"
 NEAREST, MEAN = "nearest, true time", "mean"
 ROW_NAMES = (
@@ -44,14 +42,6 @@ class Recordings:
     demos: list[Demonstration]
     contexts: np.ndarray  # (M, Q)
     groups: list[str] | None
-
-    def folds(self, by_group: bool) -> list[list[int]]:
-        """Returns the demonstrations to leave out together."""
-        if by_group and self.groups is not None:
-            names = sorted(set(self.groups))
-            return [[m for m, group in enumerate(self.groups) if group == name] for name in names]
-        n = min(MAX_FOLDS, len(self.demos))
-        return [list(range(first, len(self.demos), n)) for first in range(n)]
 
 
 def sets() -> Iterator[Recordings]:
@@ -126,7 +116,7 @@ class Scores:
 
 def evaluated(recordings: Recordings, by_group: bool, most: int) -> Scores:
     """Recognises held-out movements with models and priors of the others."""
-    folds = recordings.folds(by_group)
+    folds = observed.folds(len(recordings.demos), recordings.groups if by_group else None)
     parts: list[list[np.ndarray]] = [[], [], [], [], []]
     rng = np.random.default_rng(1)
     for fold in folds:
@@ -268,17 +258,7 @@ def times() -> str:
         demos.append(Demonstration(path, dt=0.01 * rng.uniform(0.8, 1.2)))
     model = pdmp.fit(demos, n_styles=6)
     recogniser = model.recogniser(model.prior(demos))
-    updates, estimates = [], []
-    for demo in demos:
-        recogniser.reset()
-        for time, position in zip(demo.time[:80], demo.position, strict=False):
-            begin = perf_counter()
-            recogniser.update(time, position)
-            middle = perf_counter()
-            recogniser.estimate()
-            updates.append(middle - begin)
-            estimates.append(perf_counter() - middle)
-    sample, estimate = (1e6 * np.median(each) for each in (updates, estimates))
+    sample, estimate = observed.times(recogniser, demos)
     return (
         f"## Time\n\n7 degrees of freedom, 6 styles, {recogniser.n_hypotheses} hypotheses, 30 "
         f"demonstrations: a sample takes {sample:.0f} µs and an estimate {estimate:.0f} µs "

@@ -9,11 +9,10 @@ import pdmp
 from pdmp import Demonstration
 from pdmp._markdown import markdown_table
 from recordings import ARM, is_available, rows, running_strides, walking_strides
-from report.observed import MAX_FOLDS, SHARES
+from report.observed import BAND, MAX_FOLDS, SHARES
 from report.sets import LEGS, STRIDES
 
 N_SAMPLES = 60  # of a stride
-BAND = 1.6449  # half-width of a band of 90 %, in standard deviations
 PHASES = np.linspace(0, 1, 50, endpoint=False)  # of nearest strides
 ERRORS = (
     "recogniser",
