@@ -6,6 +6,7 @@ use ndarray::Array2;
 use super::evidence::{Belief, Kernels, Weigh};
 use super::movement_table::MovementTable;
 use super::noise_filter::NoiseFilter;
+use super::prior::Moments;
 use super::triangle::square;
 use super::{Calibration, Mixture, Prior, Recogniser, Settings, Timing};
 use crate::numerics::simd::{F64x4, Kernel};
@@ -38,6 +39,39 @@ pub(super) fn prior(model: &Model, bandwidth: f64) -> Prior {
     let settings = Settings { bandwidth, tempering: 1.0, correlation_time: 0.1 };
     let mixture = Mixture { parameters, log_durations, settings, calibration: Calibration::NONE };
     Prior::new(Kind::Discrete, mixture, vec![0.004, 0.006]).unwrap()
+}
+
+/// Parameters and durations of movements that are drawn from a prior.
+pub(super) struct Draws<'a> {
+    prior: &'a Prior,
+    moments: Moments,
+    /// Cholesky factor of the covariance.
+    factor: DMatrix<f64>,
+}
+
+impl<'a> Draws<'a> {
+    pub(super) fn new(prior: &'a Prior, vectors: &[usize]) -> Self {
+        let moments = prior.moments(vectors);
+        let n = moments.mean.len();
+        let factor = DMatrix::from_fn(n, n, |i, j| moments.covariance[[i, j]]).cholesky().unwrap().l();
+        Self { prior, moments, factor }
+    }
+
+    /// Returns parameters (K,), and the duration in seconds.
+    pub(super) fn draw(&self, random: &mut Random) -> (Vec<f64>, f64) {
+        let Self { prior, moments, factor } = self;
+        let bandwidth = prior.settings().bandwidth;
+        let (n, kept) = (moments.mean.len(), (1.0 - bandwidth * bandwidth).sqrt());
+        let m = (random.next() * prior.n_demos() as f64) as usize;
+        let own = kept * (prior.log_durations()[m] - moments.log_mean);
+        let log = own + bandwidth * moments.log_deviation * normal(random);
+        let noise = factor * DVector::from_fn(n, |_, _| normal(random)) * bandwidth;
+        let parameter = |k: usize| {
+            let deviation = kept * (prior.parameters()[[m, k]] - moments.mean[k]);
+            moments.mean[k] + deviation + moments.slope[k] * (log - own) + noise[k]
+        };
+        ((0..n).map(parameter).collect(), (log + moments.log_mean).exp())
+    }
 }
 
 /// Normal random number, the sum of twelve uniform ones.
@@ -175,28 +209,14 @@ fn a_hypothesis_equals_dense_conditioning_of_the_mixture() {
 #[test]
 fn bands_hold_movements_of_the_prior() {
     let model = model();
-    let (bandwidth, mut random) = (0.5, Random(11));
-    let prior = prior(&model, bandwidth);
-    let moments = prior.moments(&[]);
+    let (prior, mut random) = (prior(&model, 0.5), Random(11));
+    let draws = Draws::new(&prior, &[]);
     let responses = super::responses(model.primitive()).unwrap();
-    let n = moments.mean.len();
-    let factor = DMatrix::from_fn(n, n, |i, j| moments.covariance[[i, j]]).cholesky().unwrap().l();
-    let kept = (1.0f64 - bandwidth * bandwidth).sqrt();
     let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
     let (mut held, mut total) = ([0.0; 3], [0.0; 3]);
     for _ in 0..150 {
-        let m = (random.next() * prior.n_demos() as f64) as usize;
-        let own = kept * (prior.log_durations()[m] - moments.log_mean);
-        let log = own + bandwidth * moments.log_deviation * normal(&mut random);
-        let noise = &factor * DVector::from_fn(n, |_, _| normal(&mut random)) * bandwidth;
-        let theta: Vec<f64> = (0..n)
-            .map(|k| {
-                let deviation = kept * (prior.parameters()[[m, k]] - moments.mean[k]);
-                moments.mean[k] + deviation + moments.slope[k] * (log - own) + noise[k]
-            })
-            .collect();
+        let (theta, duration) = draws.draw(&mut random);
         let movement = responses.dot(&ndarray::aview1(&theta));
-        let duration = (log + moments.log_mean).exp();
         recogniser.reset();
         let mut process = [0.0; 2];
         let mut position = |k: usize, random: &mut Random| {

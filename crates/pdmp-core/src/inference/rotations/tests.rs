@@ -3,11 +3,10 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
 use ndarray::Array2;
 
 use super::super::movement_table::MovementTable;
-use super::super::tests::normal;
+use super::super::tests::{Draws, normal};
 use super::super::{Calibration, Estimate, Mixture, Prior, Recogniser, Settings, Timing, responses};
 use super::{Layout, Sample};
 use crate::demonstration::{QuaternionOrder, RotationColumns};
@@ -194,29 +193,15 @@ fn poses_of_a_known_time_are_positions_about_the_mean() {
 #[test]
 fn bands_hold_poses_of_the_prior() {
     let model = model(2.0);
-    let (bandwidth, mut random) = (0.5, Random(11));
-    let prior = prior(&model, bandwidth);
+    let (prior, mut random) = (prior(&model, 0.5), Random(11));
     let layout = Layout::new(model.primitive());
-    let moments = prior.moments(&layout.vectors);
+    let draws = Draws::new(&prior, &layout.vectors);
     let responses = responses(model.primitive()).unwrap();
-    let n = moments.mean.len();
-    let factor = DMatrix::from_fn(n, n, |i, j| moments.covariance[[i, j]]).cholesky().unwrap().l();
-    let kept = (1.0f64 - bandwidth * bandwidth).sqrt();
     let mut recogniser = Recogniser::new(&model, &prior, Timing::default()).unwrap();
     let (mut held, mut total, mut errors) = ([0.0; 3], [0.0; 3], [0.0; 4]);
     for _ in 0..150 {
-        let m = (random.next() * prior.n_demos() as f64) as usize;
-        let own = kept * (prior.log_durations()[m] - moments.log_mean);
-        let log = own + bandwidth * moments.log_deviation * normal(&mut random);
-        let noise = &factor * DVector::from_fn(n, |_, _| normal(&mut random)) * bandwidth;
-        let theta: Vec<f64> = (0..n)
-            .map(|k| {
-                let deviation = kept * (prior.parameters()[[m, k]] - moments.mean[k]);
-                moments.mean[k] + deviation + moments.slope[k] * (log - own) + noise[k]
-            })
-            .collect();
+        let (theta, duration) = draws.draw(&mut random);
         let movement = responses.dot(&ndarray::aview1(&theta));
-        let duration = (log + moments.log_mean).exp();
         recogniser.reset();
         let mut process = [0.0; 4];
         let mut pose = |k: usize, random: &mut Random| {
