@@ -115,12 +115,15 @@ impl CompensatedSums {
         else {
             return [0.0; N];
         };
+        // Copies: the compiler cannot exclude that the two overlap.
+        let (mut sums, mut rests) = (*values, *compensations);
         for i in 0..N {
-            let mut sum = CompensatedSum { value: values[i], compensation: compensations[i] };
+            let mut sum = CompensatedSum { value: sums[i], compensation: rests[i] };
             sum.add(steps[i]);
-            (values[i], compensations[i]) = (sum.value, sum.compensation);
+            (sums[i], rests[i]) = (sum.value, sum.compensation);
         }
-        *values
+        (*values, *compensations) = (sums, rests);
+        sums
     }
 
     /// Returns consecutive sums from one on, `None` beyond the last.

@@ -14,8 +14,11 @@ impl ForcingTable {
         group: usize,
         style: &[f64],
     ) -> CubicSample<B> {
-        let first = self.cubics(index.first, group);
-        let second = if B::GROUPS == 2 { self.cubics(index.first, group + 1) } else { first };
+        // A known number of styles leaves one check of bounds.
+        let n_styles = if J == 0 { self.n_styles } else { J };
+        let start = index.first + group * n_styles;
+        let (first, rest) = self.cubics[start..start + B::GROUPS * n_styles].split_at(n_styles);
+        let second = if B::GROUPS == 2 { rest } else { first };
         let mut sum = [B::default(); 4];
         if J == 0 {
             #[allow(clippy::needless_range_loop)] // See `Kernel`.

@@ -26,7 +26,7 @@ use crate::numerics::simd::{F64x4, Real, Register, WIDTH, groups};
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForcingTable {
     canonical: Canonical,
-    n_styles: usize,
+    pub(super) n_styles: usize,
     n_dofs: usize,
     /// Number of cubics at a knot: one for each group of DoFs and style.
     knot_stride: usize,
@@ -37,7 +37,7 @@ pub struct ForcingTable {
     cells_per_clock: f64,
     /// By knots, groups of DoFs and styles, so that a tick reads contiguous memory. After the last knot, a and b of
     /// w = r·(a + b·p) past the end.
-    cubics: Vec<Cubic>,
+    pub(super) cubics: Vec<Cubic>,
     /// Form of the forcing past the end of a discrete movement.
     ending: Ending,
     /// Interpolation error, relative to the largest forcing.

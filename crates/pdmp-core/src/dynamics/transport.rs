@@ -134,18 +134,24 @@ impl Transport {
         }
     }
 
-    /// Returns the lag ℓ at clock `u`, which has not passed the cell `cell` or has passed on from it to another, which `cell`
-    /// then is.
+    /// Returns the lags ℓ at clocks `u`, each of which has not passed its cell or has passed on from it to another, which the
+    /// cell then is.
     #[inline(always)]
-    pub(crate) fn lag_from(&self, cell: &mut u16, u: f64) -> TransportSample {
-        let at = usize::from(*cell);
-        let Some(cubic) = self.cubics.get(at) else { return TransportSample::default() };
-        if u < self.width * (at + 1) as f64 {
-            return sample(cubic, u - self.width * at as f64);
+    #[allow(clippy::needless_range_loop)] // See `Kernel`.
+    pub(crate) fn lags_from<const N: usize>(&self, cells: &mut [u16; N], u: &[f64; N]) -> [TransportSample; N] {
+        let mut lags = [TransportSample::default(); N];
+        for i in 0..N {
+            let at = usize::from(cells[i]);
+            let Some(cubic) = self.cubics.get(at) else { continue };
+            if u[i] < self.width * (at + 1) as f64 {
+                lags[i] = sample(cubic, u[i] - self.width * at as f64);
+            } else {
+                let segment = self.segment_at(u[i]);
+                cells[i] = self.cell(&segment) as u16;
+                lags[i] = segment.lag(u[i]);
+            }
         }
-        let segment = self.segment_at(u);
-        *cell = self.cell(&segment) as u16;
-        segment.lag(u)
+        lags
     }
 
     /// Returns the lag ℓ at clock `u`.

@@ -5,6 +5,7 @@
 //! are the same functions of the same numbers, so that the motion is that of a [`Controller`] to the bit. The state of a
 //! movement takes 0.5 kB in consecutive memory (D = 7), a controller 4 kB in some thirty allocations.
 
+mod substeps;
 mod tick;
 
 use super::group::add_frame_motion;
@@ -18,7 +19,7 @@ use crate::dynamics::transport::TransportSample;
 use crate::model::primitive::Primitive;
 use crate::motion::command::Command;
 use crate::numerics::blocks::{Block, Line, compute_blocks};
-use crate::numerics::simd::{F64x4, groups};
+use crate::numerics::simd::F64x4;
 use tick::Steps;
 
 /// Clocks and scalar state of the movements.
@@ -36,7 +37,7 @@ struct SteadyClocks {
     propagator: Vec<u32>,
     /// Cell of the transport profile.
     cell: Vec<u16>,
-    /// Number of substeps of a tick.
+    /// Number of substeps of a tick, zero for an empty place.
     n_substeps: Vec<u16>,
 }
 
@@ -51,7 +52,7 @@ impl SteadyClocks {
             lag: numbers(),
             propagator: vec![0; n],
             cell: vec![0; n],
-            n_substeps: vec![1; n],
+            n_substeps: vec![0; n],
         }
     }
 }
@@ -85,8 +86,6 @@ pub(in crate::motion) struct SteadyTick {
 #[derive(Clone, Debug)]
 pub(in crate::motion) struct SteadyMovements {
     n_groups: usize,
-    n_style_groups: usize,
-    is_steady: Vec<bool>,
     /// Number of movements.
     n_steady: usize,
     clocks: SteadyClocks,
@@ -159,11 +158,9 @@ impl Controller {
 impl SteadyMovements {
     /// Returns `n` empty places.
     pub(in crate::motion) fn new(controller: &Controller, n: usize) -> Self {
-        let (n_groups, n_style_groups) = (controller.groups.len(), groups(controller.primitive.n_styles()));
+        let (n_groups, n_style_groups) = (controller.groups.len(), controller.style.value().len());
         Self {
             n_groups,
-            n_style_groups,
-            is_steady: vec![false; n],
             n_steady: 0,
             clocks: SteadyClocks::new(n),
             amplitudes: vec![[1.0; 2]; n],
@@ -177,7 +174,7 @@ impl SteadyMovements {
 
     /// Returns whether a place holds a movement.
     pub(in crate::motion) fn holds(&self, place: usize) -> bool {
-        self.is_steady[place]
+        self.clocks.n_substeps[place] > 0
     }
 
     /// Returns the number of movements.
@@ -190,7 +187,7 @@ impl SteadyMovements {
         if !controller.is_steady() || !self.share_propagator(place, &controller.propagator) {
             return;
         }
-        (self.is_steady[place], self.n_steady) = (true, self.n_steady + 1);
+        self.n_steady += 1;
         self.amplitudes[place] = [controller.r, first_element(controller.amplitude.value())];
         let clocks = &mut self.clocks;
         clocks.time.set(place, controller.time);
@@ -202,8 +199,8 @@ impl SteadyMovements {
         // Both have far smaller bounds: the cells of a profile, and the substeps of a tick.
         clocks.cell[place] = controller.primitive.transport.cell(&controller.transport_segment) as u16;
         clocks.n_substeps[place] = controller.steady_substeps() as u16;
-        let styles = &mut self.styles[place * self.n_style_groups..][..self.n_style_groups];
-        styles.copy_from_slice(controller.style.value());
+        let style = controller.style.value();
+        self.styles[place * style.len()..][..style.len()].copy_from_slice(style);
         let n_pairs = self.n_groups.div_ceil(2);
         for (index, group) in controller.groups.iter().enumerate() {
             let pair = &mut self.pairs[place * n_pairs + index / 2];
@@ -232,7 +229,7 @@ impl SteadyMovements {
 
     /// Empties a place; [`Self::write`] has the state.
     pub(in crate::motion) fn release(&mut self, place: usize) {
-        if std::mem::take(&mut self.is_steady[place]) {
+        if std::mem::take(&mut self.clocks.n_substeps[place]) > 0 {
             self.n_steady -= 1;
             self.n_users[self.clocks.propagator[place] as usize] -= 1;
         }
