@@ -89,14 +89,16 @@ pub(super) fn mean_path(
             mean
         })
         .collect();
-    if let Some(hz) = cut_off(recordings, kind, smoothing, threads)? {
+    let noise = noise_of(recordings, kind, smoothing, threads)?;
+    if noise.cut_offs()[0].is_some() {
         let time = (0..if kind == Kind::Discrete { parts + 1 } else { parts })
             .map(|k| duration * k as f64 / parts as f64)
             .collect();
         rotations.truncate(if kind == Kind::Discrete { parts + 1 } else { parts });
         let (time, period, values) =
             Recording { time, duration, rotations: rotations.clone(), warp: None }.components(kind);
-        let smoothed = Samples { time: &time, period, values: values.view() }.smoothed(&[Some(hz); 4]);
+        let samples = Samples { time: &time, period, values: values.view() };
+        let smoothed = samples.smoothed(noise.cut_offs(), noise.ends());
         let rows = smoothed.rows().into_iter().take(parts + 1);
         rotations = rows.map(|q| normalised(std::array::from_fn(|i| q[i]))).collect();
     }
@@ -122,13 +124,13 @@ fn first_mean(paths: &[Vec<Quaternion>]) -> Quaternion {
     closest.map_or([1.0, 0.0, 0.0, 0.0], |path| path[0])
 }
 
-/// Returns the cut-off in Hz of the noise of quaternion components; `None` without noise.
-fn cut_off(recordings: &[Recording], kind: Kind, smoothing: Smoothing, threads: Threads) -> Result<Option<f64>> {
+/// Returns the common noise of quaternion components.
+fn noise_of(recordings: &[Recording], kind: Kind, smoothing: Smoothing, threads: Threads) -> Result<Noise> {
     let pool: Vec<_> = pooled(recordings.len()).map(|m| recordings[m].components(kind)).collect();
     let samples: Vec<Samples> =
         pool.iter().map(|(time, period, values)| Samples { time, period: *period, values: values.view() }).collect();
-    let components = 0..4;
-    Ok(Noise::estimate(smoothing, &samples, std::slice::from_ref(&components), MIN_DECIMATED, threads)?.cut_offs()[0])
+    let components = [0..4];
+    Noise::estimate(smoothing, &samples, &components, MIN_DECIMATED, threads)?.with_ends(&samples, &components, threads)
 }
 
 /// Brings a path to rest at its end, with changes near the end that are proportional to its velocity and acceleration there.

@@ -143,7 +143,8 @@ impl Alignment {
         self.check_cut_off(aligned)?;
         let pool: Vec<(usize, Vec<f64>)> = pooled(aligned.n_demos()).map(|m| (m, aligned.seconds(m))).collect();
         let samples: Vec<Samples> = pool.iter().map(|(m, time)| aligned.samples(*m, time)).collect();
-        Noise::estimate(self.smoothing, &samples, &self.vectors, MIN_DECIMATED, threads)
+        let noise = Noise::estimate(self.smoothing, &samples, &self.vectors, MIN_DECIMATED, threads)?;
+        noise.with_ends(&samples, &self.vectors, threads)
     }
 
     /// Returns the number of samples C for that of the nominal demonstration.
@@ -295,7 +296,7 @@ impl Aligned<'_> {
         if self.noise.cut_offs().iter().all(Option::is_none) {
             return own.to_slice().map_or_else(|| Cow::Owned(own.iter().copied().collect()), Cow::Borrowed);
         }
-        let smoothed = self.samples(m, &self.seconds(m)).smoothed(self.noise.cut_offs());
+        let smoothed = self.samples(m, &self.seconds(m)).smoothed(self.noise.cut_offs(), self.noise.ends());
         Cow::Owned(smoothed.into_raw_vec_and_offset().0)
     }
 }

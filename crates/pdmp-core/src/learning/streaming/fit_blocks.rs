@@ -205,7 +205,10 @@ impl Survey {
 impl Settings {
     /// Returns whether other settings convert demonstrations to the same targets.
     fn converts_as(&self, other: &Self) -> bool {
-        self.n_samples == other.n_samples && self.cut_offs == other.cut_offs && self.canonical == other.canonical
+        self.n_samples == other.n_samples
+            && self.cut_offs == other.cut_offs
+            && self.ends == other.ends
+            && self.canonical == other.canonical
     }
 }
 

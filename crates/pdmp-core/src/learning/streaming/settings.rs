@@ -34,6 +34,8 @@ pub(super) struct Settings {
     pub(super) levels: Vec<f64>,
     /// Cut-offs in Hz (D,).
     pub(super) cut_offs: Vec<Option<f64>>,
+    /// Ends at rest (D,).
+    pub(super) ends: Vec<[bool; 2]>,
     /// Number of samples C after alignment.
     pub(super) n_samples: usize,
     pub(super) names: Vec<String>,
@@ -87,6 +89,7 @@ impl Settings {
             smoothing: options.smoothing,
             levels: aligned.noise.levels().to_vec(),
             cut_offs: aligned.noise.cut_offs().to_vec(),
+            ends: aligned.noise.ends().to_vec(),
             n_samples: aligned.n_samples,
             unit: vec![1.0; names.len()],
             size: 1.0,
@@ -115,7 +118,7 @@ impl Settings {
     /// The name of a setting out of range.
     pub(super) fn check(&self) -> std::result::Result<(), &'static str> {
         let n_dofs = self.n_dofs();
-        let lengths = [self.units.len(), self.levels.len(), self.cut_offs.len(), self.unit.len()];
+        let lengths = [self.units.len(), self.levels.len(), self.cut_offs.len(), self.ends.len(), self.unit.len()];
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let numbers =
             || self.cut_offs.iter().flatten().chain(&self.unit).chain([&self.alpha_z, &self.beta_z, &self.size]);
@@ -138,11 +141,12 @@ impl Settings {
 
     /// Returns the settings with the noise of other demonstrations.
     pub(super) fn with_noise(self, noise: &Noise) -> Self {
-        Self { levels: noise.levels().to_vec(), cut_offs: noise.cut_offs().to_vec(), ..self }
+        let (levels, cut_offs, ends) = (noise.levels().to_vec(), noise.cut_offs().to_vec(), noise.ends().to_vec());
+        Self { levels, cut_offs, ends, ..self }
     }
 
     pub(super) fn noise(&self) -> Noise {
-        Noise { levels: self.levels.clone(), cut_offs: self.cut_offs.clone() }
+        Noise { levels: self.levels.clone(), cut_offs: self.cut_offs.clone(), ends: self.ends.clone() }
     }
 
     pub(super) fn attractor(&self) -> Attractor {

@@ -103,7 +103,14 @@ impl Reader<'_> {
     fn noise(&self, n_dofs: usize) -> Result<Noise> {
         let [levels, cut_offs] = [self.array("noise.levels", &[n_dofs])?, self.array("noise.cut_offs", &[n_dofs])?];
         ensure(!levels.iter().chain(&cut_offs).any(|x| *x < 0.0), "a noise or cut-off is negative")?;
-        Ok(Noise { levels, cut_offs: cut_offs.into_iter().map(|hz| Some(hz).filter(|hz| *hz > 0.0)).collect() })
+        let cut_offs = cut_offs.into_iter().map(|hz| Some(hz).filter(|hz| *hz > 0.0)).collect();
+        // Earlier files have natural ends.
+        let ends = match self.tensors.tensor("noise.ends") {
+            Ok(_) => self.matrix("noise.ends", (n_dofs, 2))?,
+            Err(_) => Array2::zeros((n_dofs, 2)),
+        };
+        let ends = ends.rows().into_iter().map(|rest| [rest[0] > 0.0, rest[1] > 0.0]).collect();
+        Ok(Noise { levels, cut_offs, ends })
     }
 
     /// Returns the shape of an array with N axes.

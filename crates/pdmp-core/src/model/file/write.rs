@@ -87,6 +87,7 @@ impl Model {
         let knots = vec![self.forcing_table.cells() + 1, self.n_styles(), self.n_dofs()];
         // 0 stands for interpolation without smoothing.
         let cut_offs: Vec<f64> = self.learnt.noise.cut_offs().iter().map(|hz| hz.unwrap_or(0.0)).collect();
+        let ends = self.learnt.noise.ends().iter().flatten().map(|&rest| f64::from(u8::from(rest))).collect();
         let mut arrays = vec![
             matrix("styles", &demonstrated.styles),
             matrix("goals", &demonstrated.goals),
@@ -99,6 +100,7 @@ impl Model {
             vector("ranges", &self.ranges),
             vector("noise.levels", self.learnt.noise.levels()),
             vector("noise.cut_offs", &cut_offs),
+            ("noise.ends", vec![self.n_dofs(), 2], ends),
             vector("transport", self.transport.coefficients()),
             ("forcing_table.values", knots.clone(), values),
             ("forcing_table.slopes", knots, slopes),

@@ -8,7 +8,7 @@ use std::ops::Range;
 use ndarray::{Array1, Array2, ArrayView1};
 
 use super::roughness::Roughness;
-use super::{Samples, extend_periodically, lambda};
+use super::{NATURAL, Samples, extend_periodically, lambda};
 use crate::error::Result;
 use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
@@ -216,7 +216,7 @@ fn fill_scores(
     }
     for (group, hz) in cut_offs.chunks_exact(WIDTH).enumerate() {
         let pad = samples.pad(hz[0]);
-        let roughness = Roughness::new(&samples.knots(pad));
+        let roughness = Roughness::new(&samples.knots(pad), NATURAL);
         let lambdas = [0, 1, 2, 3].map(|k| lambda(hz[k] * first.interval));
         let factors = roughness.factorize(F64x4::new(lambdas));
         // The columns of Q without those of periodic copies.

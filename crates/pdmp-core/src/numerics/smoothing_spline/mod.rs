@@ -9,6 +9,7 @@
 //!
 //! solved in O(n) by LDLᵀ. On a uniform grid the spline is a low-pass filter without phase lag, with the gain 1/(1 + λω⁴)
 //! for slow signals. The frequency of half gain, the cut-off, therefore determines λ. The unit of time is the mean interval.
+//! At its ends f̈ = 0, or ḟ = 0 where the recordings of a fit begin or end at rest (`ends`).
 //!
 //! - C. H. Reinsch, Smoothing by spline functions, Numerische Mathematik 10, 1967, doi:10.1007/BF02162161;
 //! - P. Craven, G. Wahba, Smoothing noisy data with spline functions: generalised cross-validation, Numerische
@@ -17,6 +18,7 @@
 //!   doi:10.1007/BF01389878 (the trace in O(n)).
 
 mod cross_validation;
+mod ends;
 mod noise;
 mod roughness;
 #[cfg(test)]
@@ -32,9 +34,10 @@ use crate::error::{Error, Result};
 use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
 use crate::validate::{check_positive, row_major, row_major_mut};
+pub(crate) use ends::{NATURAL, Rest};
 pub use noise::Noise;
 pub(crate) use noise::{MIN_DECIMATED, pool_stride, pooled};
-use roughness::Roughness;
+use roughness::{Factorization, Roughness};
 
 /// Treatment of measurement noise before demonstrations are differentiated.
 ///
@@ -135,33 +138,59 @@ impl Samples<'_> {
         (rows.chunks_exact(self.values.ncols()).map(deviation).collect(), largest)
     }
 
-    /// Smooths each column at its cut-off in Hz. Returns values (n, D), row-major; columns without cut-off are unchanged.
-    pub(crate) fn smoothed(&self, cut_offs: &[Option<f64>]) -> Array2<f64> {
+    /// Smooths each column at its cut-off in Hz, with ends that are natural or at rest. Returns values (n, D), row-major;
+    /// columns without cut-off are unchanged.
+    pub(crate) fn smoothed(&self, cut_offs: &[Option<f64>], ends: &[Rest]) -> Array2<f64> {
         let mut smoothed = self.values.as_standard_layout().into_owned();
         let Some(lowest) = cut_offs.iter().flatten().copied().reduce(f64::min) else { return smoothed };
         let pad = self.pad(lowest);
-        let roughness = Roughness::new(&self.knots(pad));
-        let columns: Vec<usize> = (0..cut_offs.len()).filter(|&d| cut_offs[d].is_some()).collect();
-        for columns in columns.chunks(WIDTH) {
-            let mut lambdas = [1.0; WIDTH];
-            let hz = columns.iter().filter_map(|&d| cut_offs[d]);
-            lambdas.iter_mut().zip(hz).for_each(|(to, hz)| *to = lambda(hz * self.interval()));
-            let lambda = F64x4::new(lambdas);
-            // Scaling by the largest deviation avoids overflow and underflow.
-            let (deviations, largest) = self.deviations(columns);
-            let scale = largest.fast_max(F64x4::splat(f64::MIN_POSITIVE));
-            let mut scaled: Vec<F64x4> = deviations.into_iter().map(|deviation| deviation / scale).collect();
-            extend_periodically(&mut scaled, pad);
-            roughness.second_differences(&mut scaled);
-            roughness.factorize(lambda).solve(&mut scaled);
-            let rows = row_major_mut(&mut smoothed).chunks_exact_mut(self.values.ncols());
-            for (row, residual) in rows.zip(roughness.residuals(&scaled).skip(pad)) {
-                let noise = (residual * lambda * scale).to_array();
-                columns.iter().zip(noise).for_each(|(&d, noise)| row[d] -= noise);
+        let knots = self.knots(pad);
+        for rest in [NATURAL, [true, false], [false, true], [true; 2]] {
+            let columns: Vec<usize> =
+                (0..cut_offs.len()).filter(|&d| cut_offs[d].is_some() && ends[d] == rest).collect();
+            if columns.is_empty() {
+                continue;
+            }
+            let roughness = Roughness::new(&knots, rest);
+            for columns in columns.chunks(WIDTH) {
+                let Solution { lambda, scale, gamma, .. } = self.solve(columns, cut_offs, &roughness, pad);
+                let rows = row_major_mut(&mut smoothed).chunks_exact_mut(self.values.ncols());
+                for (row, residual) in rows.zip(roughness.residuals(&gamma).skip(pad)) {
+                    let noise = (residual * lambda * scale).to_array();
+                    columns.iter().zip(noise).for_each(|(&d, noise)| row[d] -= noise);
+                }
             }
         }
         smoothed
     }
+
+    /// Computes the second derivatives of the splines of one to four columns with cut-offs.
+    fn solve(&self, columns: &[usize], cut_offs: &[Option<f64>], roughness: &Roughness, pad: usize) -> Solution {
+        let mut lambdas = [1.0; WIDTH];
+        let hz = columns.iter().filter_map(|&d| cut_offs[d]);
+        lambdas.iter_mut().zip(hz).for_each(|(to, hz)| *to = lambda(hz * self.interval()));
+        let lambda = F64x4::new(lambdas);
+        // Scaling by the largest deviation avoids overflow and underflow.
+        let (deviations, largest) = self.deviations(columns);
+        let scale = largest.fast_max(F64x4::splat(f64::MIN_POSITIVE));
+        let mut gamma: Vec<F64x4> = deviations.into_iter().map(|deviation| deviation / scale).collect();
+        extend_periodically(&mut gamma, pad);
+        roughness.extend(&mut gamma);
+        roughness.second_differences(&mut gamma);
+        let factors = roughness.factorize(lambda);
+        factors.solve(&mut gamma);
+        Solution { lambda, scale, factors, gamma }
+    }
+}
+
+/// Splines of four columns.
+struct Solution {
+    lambda: F64x4,
+    /// Largest deviation of each column from its first value.
+    scale: F64x4,
+    factors: Factorization,
+    /// Second derivatives of the columns divided by `scale`.
+    gamma: Vec<F64x4>,
 }
 
 /// Extends a cycle by `pad` periodic copies of samples on either side.
@@ -188,7 +217,8 @@ pub(crate) fn smooth(
 ) -> Result<Array2<f64>> {
     let samples = Samples { time, period, values };
     smoothing.check(&samples)?;
-    Ok(samples.smoothed(Noise::estimate(smoothing, &[samples], vectors, usize::MAX, Threads::ONE)?.cut_offs()))
+    let noise = Noise::estimate(smoothing, &[samples], vectors, usize::MAX, Threads::ONE)?;
+    Ok(samples.smoothed(noise.cut_offs(), &vec![NATURAL; values.ncols()]))
 }
 
 impl Smoothing {

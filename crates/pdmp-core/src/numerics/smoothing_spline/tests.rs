@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 
 /// Returns a generator of standard normal numbers: the Box–Muller transform of a linear congruential generator.
-fn noise(mut state: u64) -> impl FnMut() -> f64 {
+pub(super) fn noise(mut state: u64) -> impl FnMut() -> f64 {
     let mut uniform = move || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
@@ -14,16 +14,16 @@ fn noise(mut state: u64) -> impl FnMut() -> f64 {
     move || (-2.0 * uniform().ln()).sqrt() * (TAU * uniform()).cos()
 }
 
-fn minimum_jerk(s: f64) -> f64 {
+pub(super) fn minimum_jerk(s: f64) -> f64 {
     s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
 }
 
-fn uniform(n: usize, step: f64) -> Vec<f64> {
+pub(super) fn uniform(n: usize, step: f64) -> Vec<f64> {
     (0..n).map(|i| i as f64 * step).collect()
 }
 
 /// Returns times with steps between half and three halves of `step`.
-fn irregular(n: usize, step: f64) -> Vec<f64> {
+pub(super) fn irregular(n: usize, step: f64) -> Vec<f64> {
     let mut normal = noise(11);
     (0..n).map(|i| (i as f64 + 0.25 * normal().clamp(-1.0, 1.0)) * step).collect()
 }
@@ -34,7 +34,7 @@ fn smooth_column(smoothing: Smoothing, time: &[f64], period: Option<f64>, y: &[f
 }
 
 /// Computes the root mean square difference.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
 }
 
@@ -111,7 +111,7 @@ fn values_and_scores_are_those_of_the_dense_formulas() {
     let mut constant = None;
     for (k, hz) in grid.into_iter().enumerate() {
         let (f, score) = dense(&knots, &y.column(0).to_vec(), lambda(hz * samples.interval()));
-        let smoothed = samples.smoothed(&[Some(hz)]);
+        let smoothed = samples.smoothed(&[Some(hz)], &[NATURAL]);
         for i in 0..40 {
             assert_abs_diff_eq!(smoothed[[i, 0]], f[i], epsilon = 1e-10);
         }
