@@ -252,6 +252,30 @@ def test_layout_of_noisy_arrays_does_not_matter() -> None:
     assert np.all(by_rows.noise > 0) and by_rows.to_bytes() == by_columns.to_bytes()
 
 
+def test_noisy_movements_start_and_end_as_recorded() -> None:
+    """Movements from and to rest have no velocity there in spite of noise; others keep theirs."""
+    random = np.random.default_rng(8)
+    time = np.linspace(0, 1, 201)
+    sizes = np.linspace(0.7, 1.3, 8)
+
+    def velocity(curve: Any) -> tuple[Any, Any, float]:
+        demos = [
+            Demonstration(
+                np.outer(curve(time), [size, 2 - size]) + 0.003 * random.standard_normal((201, 2)),
+                dt=0.005,
+            )
+            for size in sizes
+        ]
+        made = pdmp.fit(demos).rollout(dt=0.005).velocity
+        return made[0], made[-1], np.abs(made).max()
+
+    first, last, peak = velocity(lambda t: np.sin(np.pi * t / 2) ** 2)
+    assert max(np.abs(first).max(), np.abs(last).max()) < 0.01 * peak
+    first, last, peak = velocity(lambda t: np.sin(np.pi / 2 * (0.2 + 0.8 * t)))
+    np.testing.assert_allclose(first, np.pi / 2 * 0.8 * np.cos(np.pi / 10), rtol=0.1)
+    assert np.abs(last).max() < 0.02 * peak
+
+
 def test_clean_demonstrations_are_not_smoothed() -> None:
     """Automatic smoothing does not change a model of clean demonstrations."""
     clean = [_reach(bend) for bend in (-0.2, 0.0, 0.1, 0.3)]
