@@ -3,7 +3,7 @@
 //! A spline that minimises the roughness alone has no curvature at its ends, f̈ = 0. Where a movement starts from rest with an
 //! acceleration, it begins with a velocity that the movement does not have, the larger the lower the cut-off: up to a seventh
 //! of the peak velocity. With ḟ = 0 at such an end the error of the first samples is a fourth to a half less. The score of
-//! generalised cross-validation, which estimates the prediction error, tells both cases apart.
+//! generalised cross-validation, which estimates the prediction error, distinguishes the two.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::numerics::simd::{F64x4, WIDTH};
 use crate::numerics::threads::Threads;
 
-/// Whether a recording is at rest at its first and at its last sample.
+/// Ends of a recording at rest, the first and the last.
 pub(crate) type Rest = [bool; 2];
 
 /// Ends without a condition.
