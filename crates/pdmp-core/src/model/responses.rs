@@ -60,6 +60,22 @@ pub(crate) struct Curves {
     pub(crate) goal_velocity: Option<Array2<f64>>,
 }
 
+impl Curves {
+    /// Returns curves in the order of [`Self::iter`].
+    pub(crate) fn new(curves: Vec<Array2<f64>>, has_goal_velocity: bool) -> Self {
+        let mut curves = curves.into_iter();
+        let mut next = || curves.next().unwrap_or_default();
+        let (start, velocity) = (next(), next());
+        let goal_velocity = has_goal_velocity.then(next);
+        Self { start, velocity, goal_velocity, styles: curves.collect() }
+    }
+
+    /// Returns the responses to start, start velocity, final velocity if one is in force, and styles.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Array2<f64>> {
+        [&self.start, &self.velocity].into_iter().chain(&self.goal_velocity).chain(&self.styles)
+    }
+}
+
 /// Unit responses of positions, velocities and accelerations.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Responses(pub(crate) [Curves; 3]);
