@@ -289,13 +289,7 @@ fn timed_models() -> Vec<Arc<Model>> {
         let options = options(kind).n_styles(Truncation::Rank(2)).time_scaling(TimeScaling::Warp(TimeWarp::default()));
         learn(demos, &options)
     };
-    vec![
-        REACH.clone(),
-        CYCLE.clone(),
-        at_once(),
-        warped(&reaches(), Kind::Discrete),
-        warped(&cycles(), Kind::Rhythmic),
-    ]
+    vec![REACH.clone(), CYCLE.clone(), at_once(), warped(&reaches(), Kind::Discrete), warped(&cycles(), Kind::Rhythmic)]
 }
 
 proptest! {

@@ -77,7 +77,8 @@ impl Singles {
             if by_tau {
                 let movement = rollout(&self.primitive, conditions, self.grid)?;
                 let slopes = [&movement.velocity, &movement.acceleration];
-                let third = (rows.len() > 2).then(|| third_derivative(&self.primitive, conditions, self.grid.dt, slopes));
+                let third =
+                    (rows.len() > 2).then(|| third_derivative(&self.primitive, conditions, self.grid.dt, slopes));
                 let third = third.transpose()?;
                 let orders = [&movement.position, slopes[0], slopes[1]].into_iter().chain(&third);
                 product.scaled_time = scaled_time(&rows, orders.map(row_major), self.grid.dt, n_dofs);
@@ -89,12 +90,7 @@ impl Singles {
 }
 
 /// Returns Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ + Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩ of a movement with its cotangents.
-fn scaled_time<'a>(
-    cotangents: &[&[f64]],
-    mut orders: impl Iterator<Item = &'a [f64]>,
-    dt: f64,
-    n_dofs: usize,
-) -> f64 {
+fn scaled_time<'a>(cotangents: &[&[f64]], mut orders: impl Iterator<Item = &'a [f64]>, dt: f64, n_dofs: usize) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
     let (mut sum, mut order) = (0.0, orders.next().unwrap_or_default());
     for ((k, v), slopes) in cotangents.iter().enumerate().zip(orders) {

@@ -145,29 +145,31 @@ fn compute_responses(
         let Trajectory { position, velocity, acceleration, .. } = rollout_with(primitive, unit, grid, &mut progress)?;
         orders.iter_mut().zip([position, velocity, acceleration]).for_each(|(curves, curve)| curves.push(curve));
     }
-    Ok(Responses(orders.map(|curves| Curves::new(curves, has_goal_velocity))))
+    Ok(Responses::new(orders.map(|curves| Curves::new(curves, has_goal_velocity))))
 }
 
 /// Returns the third derivatives of responses with respect to time, at intervals `dt`; those of a batch with an additional
 /// forcing have its displacement as their last style.
 ///
-/// They are not kept in the cache, since only gradients of accelerations with respect to τ need them.
-///
 /// # Errors
 /// Derivatives that do not fit into memory.
-pub(crate) fn third_derivatives(
+pub(crate) fn third_derivatives<'a>(
     primitive: &Arc<Primitive>,
-    responses: &Responses,
+    responses: &'a Responses,
     tau: f64,
     forcing: Option<&Arc<AdditionalForcing>>,
     dt: f64,
-) -> Result<Curves> {
-    let [velocities, accelerations] = [Derivative::Velocity, Derivative::Acceleration].map(|order| responses.of(order));
-    let has_goal_velocity = velocities.goal_velocity.is_some();
-    let units = unit_conditions(primitive, tau, has_goal_velocity, forcing);
-    let slopes = velocities.iter().zip(accelerations.iter());
-    let third = |(unit, (velocity, acceleration))| third_derivative(primitive, unit, dt, [velocity, acceleration]);
-    Ok(Curves::new(units.iter().zip(slopes).map(third).collect::<Result<_>>()?, has_goal_velocity))
+) -> Result<&'a Curves> {
+    let third = responses.third(|| {
+        let (velocities, accelerations) = (responses.of(Derivative::Velocity), responses.of(Derivative::Acceleration));
+        let has_goal_velocity = velocities.goal_velocity.is_some();
+        let units = unit_conditions(primitive, tau, has_goal_velocity, forcing);
+        let slopes = velocities.iter().zip(accelerations.iter());
+        let third = |(unit, (velocity, acceleration))| third_derivative(primitive, unit, dt, [velocity, acceleration]);
+        Ok(Curves::new(units.iter().zip(slopes).map(third).collect::<Result<_>>()?, has_goal_velocity))
+    });
+    primitive.responses.trim();
+    third
 }
 
 /// Returns the conditions whose movements are the responses, in the order of [`Curves::iter`].
@@ -182,10 +184,8 @@ fn unit_conditions(
     let goal_velocity = vector(0.0).filter(|_| has_goal_velocity);
     let base = Conditions { goal_velocity, tau: Some(tau), ..about_zero(primitive) };
     let zero = Conditions { style: Some(vec![0.0; n_styles]), start: vector(0.0), ..base.clone() };
-    let mut units = vec![
-        Conditions { start: vector(1.0), ..zero.clone() },
-        Conditions { velocity: vector(1.0), ..zero.clone() },
-    ];
+    let mut units =
+        vec![Conditions { start: vector(1.0), ..zero.clone() }, Conditions { velocity: vector(1.0), ..zero.clone() }];
     units.extend(has_goal_velocity.then(|| Conditions { goal_velocity: vector(1.0), ..zero.clone() }));
     units.extend((0..n_styles).map(|j| {
         let style = (0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect();

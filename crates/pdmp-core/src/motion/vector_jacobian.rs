@@ -91,9 +91,8 @@ impl Batch {
             false => Vec::new(),
         };
         let by_accelerations = by_tau && cotangents.len() > 2 && self.singles.is_none();
-        let third = by_accelerations.then(|| {
-            third_derivatives(&self.primitive, &self.responses, self.tau, self.forcing.as_ref(), self.dt)
-        });
+        let third = by_accelerations
+            .then(|| third_derivatives(&self.primitive, &self.responses, self.tau, self.forcing.as_ref(), self.dt));
         let work = Contraction { batch: self, time, by_tau, third: third.transpose()? };
         let in_block = (BLOCK / (n_samples * n_dofs)).max(MIN_MOVEMENTS_PER_BLOCK);
         let mut outputs: Vec<_> =
@@ -228,7 +227,7 @@ struct Contraction<'a> {
     time: Vec<f64>,
     by_tau: bool,
     /// Third derivatives of the responses, if τ is a variable of accelerations.
-    third: Option<Curves>,
+    third: Option<&'a Curves>,
 }
 
 impl Contraction<'_> {
@@ -252,7 +251,7 @@ impl Contraction<'_> {
                 let part = Tile::new(batch.responses.of(order), at.clone());
                 let slope = match Derivative::ALL.get(order as usize + 1) {
                     Some(slope) => Some(batch.responses.of(*slope)).filter(|_| self.by_tau),
-                    None => self.third.as_ref(),
+                    None => self.third,
                 };
                 let slope = slope.map(|curves| Tile::new(curves, at.clone()));
                 let movements = combinations.iter().zip(&mut products).zip(row_major(&cotangents).chunks(length));
