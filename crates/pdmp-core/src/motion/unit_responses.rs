@@ -184,13 +184,15 @@ fn unit_conditions(
     let goal_velocity = vector(0.0).filter(|_| has_goal_velocity);
     let base = Conditions { goal_velocity, tau: Some(tau), ..about_zero(primitive) };
     let zero = Conditions { style: Some(vec![0.0; n_styles]), start: vector(0.0), ..base.clone() };
-    let mut units =
-        vec![Conditions { start: vector(1.0), ..zero.clone() }, Conditions { velocity: vector(1.0), ..zero.clone() }];
-    units.extend(has_goal_velocity.then(|| Conditions { goal_velocity: vector(1.0), ..zero.clone() }));
-    units.extend((0..n_styles).map(|j| {
-        let style = (0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
-        Conditions { style: Some(style), ..base.clone() }
-    }));
+    let first_style = 2 + usize::from(has_goal_velocity);
+    let mut units = vec![zero.clone(); first_style];
+    units[0].start = vector(1.0);
+    units[1].velocity = vector(1.0);
+    units[2..].iter_mut().for_each(|unit| unit.goal_velocity = vector(1.0));
+    units.resize(first_style + n_styles, base);
+    for (j, unit) in units[first_style..].iter_mut().enumerate() {
+        unit.style = Some((0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect());
+    }
     units.extend(forcing.map(|forcing| Conditions { forcing: Some(Arc::clone(forcing)), ..zero }));
     units
 }
