@@ -174,11 +174,11 @@ impl Cache {
             entries.retain(|(k, _)| *k != key);
             entries.push_back((key, Arc::clone(responses)));
         });
-        self.trim();
+        self.evict_excess();
     }
 
     /// Evicts the least recently used responses beyond the limits.
-    pub(crate) fn trim(&self) {
+    pub(crate) fn evict_excess(&self) {
         self.with(|entries| {
             while entries.len() > MAX_ENTRIES || entries.iter().map(|(_, r)| r.bytes()).sum::<usize>() > MAX_BYTES {
                 entries.pop_front();
@@ -239,7 +239,7 @@ mod tests {
         assert!(cache.find(key(30)).is_some() && cache.find(key(31)).is_some());
         larger.third(|| Ok(larger.of(Derivative::Position).clone())).unwrap();
         larger.third(|| panic!("computed again")).unwrap();
-        cache.trim();
+        cache.evict_excess();
         assert!(cache.find(key(30)).is_none() && cache.find(key(31)).is_some());
     }
 

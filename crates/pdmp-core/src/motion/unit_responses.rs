@@ -168,7 +168,7 @@ pub(crate) fn third_derivatives<'a>(
         let third = |(unit, (velocity, acceleration))| third_derivative(primitive, unit, dt, [velocity, acceleration]);
         Ok(Curves::new(units.iter().zip(slopes).map(third).collect::<Result<_>>()?, has_goal_velocity))
     });
-    primitive.responses.trim();
+    primitive.responses.evict_excess();
     third
 }
 
