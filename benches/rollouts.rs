@@ -5,7 +5,8 @@ mod movements;
 
 use std::sync::Arc;
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use criterion::measurement::WallTime;
+use criterion::{BatchSize, BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use movements::movements;
 use ndarray::{Array2, Array3};
 use pdmp_core::learning::Truncation;
@@ -13,7 +14,7 @@ use pdmp_core::learning::regression::{Basis, NGnet};
 use pdmp_core::model::Derivative;
 use pdmp_core::motion::batch;
 use pdmp_core::motion::jacobian;
-use pdmp_core::motion::{BatchConditions, PerMovement, TimeGrid, WithRespectTo};
+use pdmp_core::motion::{Batch, BatchConditions, PerMovement, TimeGrid, WithRespectTo};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
 use pdmp_core::{Conditions, FitOptions, Model, fit};
@@ -21,6 +22,32 @@ use pdmp_core::{Conditions, FitOptions, Model, fit};
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = FitOptions::discrete().n_styles(Truncation::Rank(n_styles)).basis(Basis::NGnet(NGnet::default()));
     Arc::new(fit(&movements(40, 1001), &options).expect("a fit"))
+}
+
+/// Measures rollouts with accelerations, and their gradients by all variables and by those but the last, τ.
+fn with_accelerations(
+    group: &mut BenchmarkGroup<WallTime>,
+    n: &str,
+    timing: &str,
+    batch: &Batch,
+    variables: &[WithRespectTo],
+) {
+    let mut outputs = [(); 3].map(|()| Array3::zeros(batch.shape()));
+    let cotangents = [(); 3].map(|()| Array3::from_elem(batch.shape(), 0.5));
+    let cotangents = cotangents.each_ref().map(|array| array.view());
+    let all = 0..batch.shape().0;
+    group.bench_function(format!("{n} rollouts with accelerations{timing}"), |bench| {
+        bench.iter(|| {
+            let outputs = outputs.each_mut().map(|output| output.view_mut());
+            batch.write(all.clone(), outputs.into(), Threads::ONE, &mut |_| Ok(()))
+        });
+    });
+    for (name, variables) in [("", &variables[..variables.len() - 1]), (" and tau", variables)] {
+        let name = format!("{n} gradients with accelerations by style, goal, start{name}{timing}");
+        group.bench_function(name, |bench| {
+            bench.iter(|| batch.vector_jacobian(all.clone(), variables, &cotangents, Threads::ONE, &mut |_| Ok(())));
+        });
+    }
 }
 
 fn rollouts(criterion: &mut Criterion) {
@@ -43,6 +70,9 @@ fn rollouts(criterion: &mut Criterion) {
             group.bench_function(name, |bench| {
                 bench.iter(|| batch.vector_jacobian(0..1000, variables, &cotangents, Threads::ONE, &mut |_| Ok(())));
             });
+        }
+        if n_styles == 3 {
+            with_accelerations(&mut group, "1000", "", &batch, &variables);
         }
         for n_threads in [1, 2] {
             let threads = Threads::new(n_threads).expect("some");
@@ -82,6 +112,7 @@ fn rollouts(criterion: &mut Criterion) {
             bench.iter(|| batch.vector_jacobian(0..n, variables, &cotangents, Threads::ONE, &mut |_| Ok(())));
         });
     }
+    with_accelerations(&mut group, "100", ", each with its tau", &batch, &variables);
     let jacobian = |model: &Arc<Model>| {
         let (variable, derivative) = (WithRespectTo::Style, Derivative::Position);
         jacobian(model.primitive(), variable, derivative, &Conditions::default(), grid, &mut |_| Ok(()))

@@ -19,15 +19,16 @@ def centre_of(model: pdmp.Model) -> str:
 
 
 def cost(movements: tuple[Any, ...]) -> Any:
-    """Returns a loss that is not linear in positions and velocities."""
-    positions, velocities = movements
-    return (positions**2 * (1 + positions)).sum() + 0.1 * (velocities**2).sum()
+    """Returns a loss that is not linear in positions, velocities and accelerations."""
+    positions, velocities, accelerations = movements
+    slopes = 0.1 * (velocities**2).sum() + 1e-3 * (accelerations**2).sum()
+    return (positions**2 * (1 + positions)).sum() + slopes
 
 
 def cotangents(movements: tuple[Any, ...]) -> tuple[Any, ...]:
     """Returns the derivatives of `cost`."""
-    positions, velocities = movements
-    return 2 * positions + 3 * positions**2, 0.2 * velocities
+    positions, velocities, accelerations = movements
+    return 2 * positions + 3 * positions**2, 0.2 * velocities, 2e-3 * accelerations
 
 
 def difference(model: pdmp.Model, given: dict[str, Any], name: str, options: Any) -> Any:
@@ -38,7 +39,7 @@ def difference(model: pdmp.Model, given: dict[str, Any], name: str, options: Any
         step = np.zeros(value.shape)
         step[index] = 1e-5
         ahead, behind = (
-            cost(model.rollouts(**{**given, name: value + sign * step}, **options))
+            cost(model.rollouts(**{**given, name: value + sign * step}, derivatives=2, **options))
             for sign in (1, -1)
         )
         found[index] = (ahead - behind) / 2e-5
@@ -71,13 +72,13 @@ def timed_for(model: pdmp.Model) -> dict[str, Any]:
 
 @pytest.mark.parametrize("conditions", [given_for, timed_for])
 def test_gradients_are_differences_of_costs(model: pdmp.Model, conditions: Any) -> None:
-    """The products are the gradients of a cost of positions and velocities by every condition."""
+    """The products are the gradients of a cost of movements by every condition."""
     given = conditions(model)
     options: dict[str, Any] = {"dt": 0.002, "duration": 1.3}
     if conditions is timed_for and model.kind == "rhythmic":
         options["phase"] = np.linspace(-1.0, 5.0, 7)
     wrt: Any = list(given)
-    movements = model.rollouts(**given, **options)
+    movements = model.rollouts(**given, derivatives=2, **options)
     found = model.rollouts_vjp(wrt, cotangents(movements), **given, **options)
     for name, gradient in zip(wrt, found, strict=True):
         expected = difference(model, given, name, options)
@@ -103,7 +104,7 @@ def test_segment_durations_have_gradients_but_for_tau() -> None:
     model = pdmp.fit(demos, dt=0.01, n_styles=2, alignment=pdmp.TimeWarp(4))
     given: dict[str, Any] = {"style": RNG.normal(size=(3, 2)), "goal": RNG.normal(size=(3, 2))}
     options = {"dt": 0.005, "duration": 1.2, "segment_durations": model.segment_durations[:3]}
-    movements = model.rollouts(**given, **options)
+    movements = model.rollouts(**given, derivatives=2, **options)
     found = model.rollouts_vjp(["style", "goal"], cotangents(movements), **given, **options)
     for name, gradient in zip(given, found, strict=True):
         expected = difference(model, given, name, options)
@@ -120,7 +121,7 @@ def test_products_are_those_with_jacobians(model: pdmp.Model) -> None:
     for derivative in range(3):
         arrays = [np.zeros((1, 101, 2)) for _ in range(derivative + 1)]
         arrays[-1] = RNG.normal(size=(1, 101, 2))
-        wrt: Any = [*given, *(["tau"] if derivative < 2 else [])]
+        wrt: Any = [*given, "tau"]
         found = model.rollouts_vjp(wrt, tuple(arrays), duration=1.0, **given)
         for name, gradient in zip(wrt, found, strict=True):
             jacobian = model.jacobian(name, derivative=derivative, duration=1.0, **given)
@@ -166,7 +167,7 @@ def test_jax_differentiates_through_movements(model: pdmp.Model) -> None:
     jax = pytest.importorskip("jax")
     with jax.enable_x64(True):
         given, options = given_for(model), {"dt": 0.002, "duration": 1.3}
-        move = pdmp.autodiff.jax_rollouts(model, derivatives=1, **options)
+        move = pdmp.autodiff.jax_rollouts(model, derivatives=2, **options)
 
         def loss(given: dict[str, Any]) -> Any:
             return cost(move(**given))
@@ -178,7 +179,9 @@ def test_jax_differentiates_through_movements(model: pdmp.Model) -> None:
                 assert found[name].shape == expected.shape
                 scale = abs(expected).max()
                 np.testing.assert_allclose(found[name], expected, rtol=1e-5, atol=1e-6 * scale)
-        for made, expected in zip(move(**given), model.rollouts(**given, **options), strict=True):
+        for made, expected in zip(
+            move(**given), model.rollouts(**given, derivatives=2, **options), strict=True
+        ):
             np.testing.assert_array_equal(made, expected)
         mapped = jax.vmap(lambda style: move(style=style)[0][0])(STYLES)
         np.testing.assert_array_equal(mapped, model.rollouts(style=STYLES, **options)[0])
@@ -190,7 +193,7 @@ def test_jax_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
     check_grads = pytest.importorskip("jax.test_util").check_grads
     with jax.enable_x64(True):
         given = {n: jax.numpy.asarray(v, dtype=float) for n, v in timed_for(model).items()}
-        move = pdmp.autodiff.jax_rollouts(model, derivatives=1, dt=0.05, duration=1.3)
+        move = pdmp.autodiff.jax_rollouts(model, derivatives=2, dt=0.05, duration=1.3)
         check_grads(
             lambda given: jax.jit(move)(**given),
             (given,),
@@ -216,7 +219,7 @@ def test_torch_differentiates_through_movements(model: pdmp.Model) -> None:
     """Gradients by torch are those of rollouts, of shared conditions too."""
     torch = pytest.importorskip("torch")
     given, options = given_for(model), {"dt": 0.002, "duration": 1.3}
-    move = pdmp.autodiff.torch_rollouts(model, derivatives=1, **options)
+    move = pdmp.autodiff.torch_rollouts(model, derivatives=2, **options)
     tensors = {
         name: torch.tensor(value, dtype=torch.float64, requires_grad=True)
         for name, value in given.items()
@@ -232,10 +235,12 @@ def test_torch_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
     """`torch.autograd.gradcheck` accepts gradients of movements that differ in tau."""
     torch = pytest.importorskip("torch")
     given = {name: torch.tensor(value[:3]).double() for name, value in timed_for(model).items()}
-    move = pdmp.autodiff.torch_rollouts(model, derivatives=1, dt=0.05, duration=1.3)
+    move = pdmp.autodiff.torch_rollouts(model, derivatives=2, dt=0.05, duration=1.3)
 
     def moved(*values: Any) -> Any:
-        return move(**dict(zip(given, values, strict=True)))
+        *rest, accelerations = move(**dict(zip(given, values, strict=True)))
+        # Their derivatives by tau reach 1e4: differences have nine digits.
+        return *rest, 1e-3 * accelerations
 
     tensors = [value.requires_grad_() for value in given.values()]
     assert torch.autograd.gradcheck(moved, tensors, eps=1e-6, atol=1e-6, rtol=1e-5)

@@ -1307,8 +1307,8 @@ class Model:
         For a function L of the results of `rollouts`, with the cotangents v = ∂L/∂y, returns the vector-Jacobian products
         ∂L/∂x = Σ_t v(t)·∂y(t)/∂x of the conditions x. A movement is linear in all conditions but tau, so that the products
         are exact; no Jacobian is formed, and a call takes about as long as `rollouts`, also of movements that differ in tau,
-        phase or segment durations. With respect to tau, they hold at fixed times. `pdmp.autodiff` wraps both calls for torch
-        and jax.
+        phase or segment durations. With respect to tau, they hold at fixed times, for accelerations as in `jacobian`.
+        `pdmp.autodiff` wraps both calls for torch and jax.
 
         Parameters
         ----------
@@ -1337,8 +1337,8 @@ class Model:
         ------
         ValueError
             An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind of
-            primitive; a velocity or start of which there is none to differentiate by; tau with accelerations or
-            `segment_durations`; or a model with rotations.
+            primitive; a velocity or start of which there is none to differentiate by; tau with `segment_durations`, which
+            are given in place of it; or a model with rotations.
         TypeError
             As in `rollouts`.
 
@@ -1588,6 +1588,10 @@ class Model:
         style also on the amplitude, and that by the amplitude on the style. With respect to tau it is the derivative at
         fixed times, with velocities among the conditions constant. `rollouts_vjp` gives gradients without a Jacobian.
 
+        The derivative of accelerations with respect to tau contains the third derivative of y, which jumps where the clock
+        passes a knot of the forcing table or of the transport profile: at such a sample, its mean is used. At the end of a
+        movement that does not end at rest the accelerations jump, and the sample there has no derivative.
+
         Parameters
         ----------
         wrt : {"style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude", "tau"}
@@ -1614,8 +1618,7 @@ class Model:
         Raises
         ------
         ValueError
-            Conditions that `rollout` rejects, a condition of the other kind of primitive, several segment durations, or
-            tau with accelerations.
+            Conditions that `rollout` rejects, a condition of the other kind of primitive, or several segment durations.
 
         Examples
         --------

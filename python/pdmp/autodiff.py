@@ -53,8 +53,8 @@ def torch_rollouts(
         Function of conditions by name, each a tensor (n,) or (B, n); `tau` and `amplitude` are
         scalars or (B,). It returns a tuple of tensors (B, T, D): positions, and the derivatives
         asked for.
-        Gradients with respect to `tau` hold at fixed times, without accelerations. Second
-        derivatives are not available.
+        Gradients with respect to `tau` hold at fixed times, for accelerations as in
+        `Model.jacobian`. Second derivatives are not available.
 
     Raises
     ------
@@ -136,8 +136,8 @@ def jax_rollouts(
         Function of conditions by name, each an array (n,) or (B, n); `tau` and `amplitude` are
         scalars or (B,). It returns a tuple of arrays (B, T, D): positions, and the derivatives
         asked for.
-        Gradients with respect to `tau` hold at fixed times, without accelerations. Second and
-        forward derivatives are not available.
+        Gradients with respect to `tau` hold at fixed times, for accelerations as in
+        `Model.jacobian`. Second and forward derivatives are not available.
 
     Raises
     ------

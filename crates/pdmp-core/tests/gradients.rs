@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use common::*;
 use ndarray::{Array2, Array3, ArrayView3, Axis, s};
+use pdmp_core::inference::{At, PassageOptions, ViaPoint, through};
 use pdmp_core::learning::{TimeScaling, Truncation};
 use pdmp_core::model::{Derivative, TimeWarp};
 use pdmp_core::motion::{self, Batch, BatchConditions, PerMovement, TimeGrid, WithRespectTo, batch};
@@ -57,7 +58,7 @@ fn condition(conditions: &BatchConditions, b: usize) -> Conditions {
 }
 
 /// Variables of a batch: those of its kind whose conditions it has.
-fn variables(kind: Kind, conditions: &BatchConditions, orders: usize) -> Vec<WithRespectTo> {
+fn variables(kind: Kind, conditions: &BatchConditions) -> Vec<WithRespectTo> {
     let discrete = kind == Kind::Discrete;
     [
         (WithRespectTo::Style, true),
@@ -67,7 +68,7 @@ fn variables(kind: Kind, conditions: &BatchConditions, orders: usize) -> Vec<Wit
         (WithRespectTo::Velocity, conditions.velocity.is_some()),
         (WithRespectTo::GoalVelocity, conditions.goal_velocity.is_some()),
         (WithRespectTo::Amplitude, !discrete),
-        (WithRespectTo::Tau, orders < 3),
+        (WithRespectTo::Tau, true),
     ]
     .into_iter()
     .filter_map(|(variable, present)| present.then_some(variable))
@@ -101,7 +102,7 @@ proptest! {
                 ..BatchConditions::default()
             };
             let grid = grid(0.01, 0.01 * (samples - 1) as f64);
-            let variables = variables(model.kind(), &conditions, orders);
+            let variables = variables(model.kind(), &conditions);
             let prepared = prepared(model, &conditions, grid);
             let cotangents: Vec<_> = (0..orders).map(|k| noise(prepared.shape(), seed + 9 + k as u64)).collect();
             let found = gradients(&prepared, &variables, &cotangents);
@@ -134,40 +135,151 @@ proptest! {
     }
 }
 
-/// The gradient by τ at fixed times is the central difference of rollouts, with velocities given and not, within the
-/// accuracy of the differences.
-#[test]
-fn gradient_by_tau_is_a_difference_of_rollouts() {
-    let mut compared = 0;
-    for model in [&*REACH, &*CYCLE] {
+/// Movements whose derivatives by τ the tests compare: both kinds and both transports, with and without given velocities,
+/// phase and additional forcing, at a τ of their own.
+fn cases_by_tau() -> Vec<(Arc<Model>, Conditions)> {
+    let mut cases = Vec::new();
+    for model in [REACH.clone(), CYCLE.clone(), at_once()] {
         let (n, discrete) = (model.n_dofs(), model.kind() == Kind::Discrete);
-        for velocity in [None, Some(vec![0.7; n])] {
-            let goal_velocity = velocity.clone().filter(|_| discrete);
-            let conditions = Conditions {
-                style: Some(vec![0.2, -0.3]),
-                velocity,
-                goal_velocity,
-                tau: Some(1.3 * model.tau()),
-                ..Conditions::default()
-            };
-            let grid = grid(1e-3, 1.2 * model.duration());
-            let shared = BatchConditions::shared(model.primitive(), conditions.clone()).unwrap();
-            let prepared = prepared(model, &shared, grid);
-            let cotangents: Vec<_> = (0..2).map(|k| noise(prepared.shape(), 5 + k)).collect();
-            let found = gradients(&prepared, &[WithRespectTo::Tau], &cotangents)[0][[0, 0]];
-            let cost = |step: f64| {
-                let tau = conditions.tau.map(|tau| tau * (1.0 + step));
-                let moved = rollout(model.primitive(), &Conditions { tau, ..conditions.clone() }, grid).unwrap();
-                let dot = |v: &Array3<f64>, y: &Array2<f64>| (&v.index_axis(Axis(0), 0) * y).sum();
-                dot(&cotangents[0], &moved.position) + dot(&cotangents[1], &moved.velocity)
-            };
-            let step = 1e-5;
-            let expected = (cost(step) - cost(-step)) / (2.0 * step * 1.3 * model.tau());
-            assert!((found - expected).abs() < 1e-5 * expected.abs().max(1.0), "{found} {expected}");
-            compared += 1;
+        let own = Conditions {
+            style: Some(vec![0.2, -0.3]),
+            tau: Some(1.3171 * model.tau()),
+            amplitude: (!discrete).then_some(0.7),
+            ..Conditions::default()
+        };
+        let moved = Conditions {
+            goal: discrete.then(|| vec![1.4; n]),
+            start: Some(vec![0.4; n]),
+            velocity: Some(vec![0.7; n]),
+            ..own.clone()
+        };
+        let points = [ViaPoint::new(At::Time(0.4 * model.duration()), vec![0.5; n])];
+        let forced = through(&model, &points, &own, &PassageOptions::default()).unwrap();
+        let both = Conditions { forcing: Some(forced.forcing), ..moved.clone() };
+        if model.kind() == Kind::Rhythmic {
+            cases.push((model.clone(), Conditions { phase: Some(4.0), ..moved.clone() }));
+            cases.push((model.clone(), Conditions { phase: Some(0.3), ..both.clone() }));
+        } else if model.primitive().braking().is_some() {
+            let last = Some(vec![-0.6; n]);
+            cases.push((model.clone(), Conditions { goal_velocity: last.clone(), ..own.clone() }));
+            cases.push((model.clone(), Conditions { goal_velocity: last.clone(), ..moved.clone() }));
+            cases.push((model.clone(), Conditions { goal_velocity: last, ..both.clone() }));
+        }
+        cases.extend([own, moved, both].map(|one| (model.clone(), one)));
+    }
+    cases
+}
+
+/// The Jacobian by τ of positions, velocities and accelerations is the central difference of rollouts at fixed times, beyond the
+/// end too. Where the slope of the acceleration jumps within the step, at a knot, the difference lies between both slopes.
+#[test]
+fn jacobian_by_tau_is_a_difference_of_rollouts() {
+    let (mut compared, mut at_jumps) = (0, 0);
+    for (case, (model, conditions)) in cases_by_tau().iter().enumerate() {
+        if conditions.phase.is_some() {
+            continue;
+        }
+        let (tau, step, grid) = (conditions.tau.unwrap(), 1e-6, grid(3.7e-3, 1.7 * model.duration()));
+        let [behind, here, ahead] = [-step, 0.0, step].map(|step| {
+            let moved = Conditions { tau: Some(tau * (1.0 + step)), ..conditions.clone() };
+            let movement = rollout(model.primitive(), &moved, grid).unwrap();
+            [movement.position, movement.velocity, movement.acceleration]
+        });
+        for (k, order) in Derivative::ALL.into_iter().enumerate() {
+            let variable = WithRespectTo::Tau;
+            let found =
+                motion::jacobian(model.primitive(), variable, order, conditions, grid, &mut |_| Ok(())).unwrap();
+            let size = found.iter().fold(0.0f64, |size, entry| size.max(entry.abs()));
+            for ((t, d, _), found) in found.indexed_iter() {
+                let [a, b, c] = [&behind, &here, &ahead].map(|movement| movement[k][[t, d]]);
+                let [before, after] = [(b - a) / (step * tau), (c - b) / (step * tau)];
+                let (error, jump) = ((found - 0.5 * (before + after)).abs(), 0.5 * (after - before).abs());
+                assert!(error < jump + 1e-5 * size, "{case} {order:?} at {t}, {d}: {found} {before} {after}");
+                compared += 1;
+                at_jumps += usize::from(jump > 1e-3 * size);
+            }
         }
     }
-    assert_eq!(compared, 4);
+    assert!(compared > 30_000 && at_jumps * 200 < compared, "{at_jumps} of {compared}");
+}
+
+/// At samples on the knots of the forcing table and of the transport profile, where the slope of the acceleration jumps, the
+/// derivative by τ is the mean of the slopes on both sides.
+#[test]
+fn derivative_by_tau_at_a_knot_is_the_mean_of_both_sides() {
+    let (model, mut jumps) = (&*REACH, 0);
+    let tau = 1.3 * model.tau();
+    let grid = grid(model.duration() * 1.3 / 64.0, model.duration() * 1.5);
+    let conditions = Conditions { start: Some(vec![0.5; 3]), tau: Some(tau), ..Conditions::default() };
+    let (order, variable) = (Derivative::Acceleration, WithRespectTo::Tau);
+    let found = motion::jacobian(model.primitive(), variable, order, &conditions, grid, &mut |_| Ok(())).unwrap();
+    let at = |step: f64| {
+        let moved = Conditions { tau: Some(tau * (1.0 + step)), ..conditions.clone() };
+        rollout(model.primitive(), &moved, grid).unwrap().acceleration
+    };
+    let step = 1e-6;
+    let movements = [-2.0 * step, -step, step, 2.0 * step].map(at);
+    let size = found.iter().fold(0.0f64, |size, entry| size.max(entry.abs()));
+    for ((t, d, _), found) in found.indexed_iter().filter(|((t, ..), _)| *t != 64) {
+        // Slopes on both sides, each from two movements on it.
+        let [a, b, c, e] = movements.each_ref().map(|movement| movement[[t, d]]);
+        let [before, after] = [(b - a) / (step * tau), (e - c) / (step * tau)];
+        assert!((found - 0.5 * (before + after)).abs() < 3e-4 * size, "{t} {d}: {found} {before} {after}");
+        jumps += usize::from((after - before).abs() > 1e-2 * size);
+    }
+    assert!(jumps > 10, "{jumps}");
+}
+
+/// The gradients by τ are those of the Jacobian, by differences of rollouts for a phase, with response curves in common and
+/// without.
+#[test]
+fn gradients_by_tau_are_those_of_rollouts() {
+    for (case, (model, conditions)) in cases_by_tau().iter().enumerate() {
+        let (grid, tau) = (grid(3.7e-3, 1.7 * model.duration()), conditions.tau.unwrap());
+        let other = Conditions { tau: Some(0.8 * tau), ..conditions.clone() };
+        let phased = conditions.phase.is_some();
+        for movements in [vec![conditions.clone()], vec![conditions.clone(), other]] {
+            let all = BatchConditions::each(model.primitive(), &movements).unwrap();
+            let prepared = prepared(model, &all, grid);
+            let cotangents: Vec<_> = (0..3).map(|k| noise(prepared.shape(), 5 + k)).collect();
+            let found = &gradients(&prepared, &[WithRespectTo::Tau], &cotangents)[0];
+            for (b, one) in movements.iter().enumerate() {
+                let (mut expected, mut size) = (0.0, 0.0f64);
+                let tau = one.tau.unwrap();
+                for (k, order) in Derivative::ALL.into_iter().enumerate() {
+                    let entries = match phased {
+                        false => {
+                            let by_tau = WithRespectTo::Tau;
+                            motion::jacobian(model.primitive(), by_tau, order, one, grid, &mut |_| Ok(()))
+                                .unwrap()
+                                .remove_axis(Axis(2))
+                        }
+                        true => {
+                            let [behind, ahead] = [-1e-6, 1e-6].map(|step| {
+                                let moved = Conditions { tau: Some(tau * (1.0 + step)), ..one.clone() };
+                                let movement = rollout(model.primitive(), &moved, grid).unwrap();
+                                [movement.position, movement.velocity, movement.acceleration]
+                            });
+                            (&ahead[k] - &behind[k]) / (2e-6 * tau)
+                        }
+                    };
+                    let products = &cotangents[k].index_axis(Axis(0), b) * &entries;
+                    expected += products.sum();
+                    size += products.mapv(f64::abs).sum();
+                }
+                let tolerance = if phased { 1e-5 } else { 1e-11 };
+                let found = found[[b, 0]];
+                assert!((found - expected).abs() < tolerance * size, "{case} {b}: {found} {expected} {size}");
+            }
+        }
+    }
+}
+
+/// Model of the reaches with immediate transport.
+fn at_once() -> Arc<Model> {
+    let mut options = options(Kind::Discrete).n_styles(Truncation::Rank(2));
+    options.canonical = immediate();
+    learn(&reaches(), &options)
 }
 
 /// Models of the tests of movements with a timing of their own: learnt and immediate transport, rhythmic, and both kinds in
@@ -177,15 +289,7 @@ fn timed_models() -> Vec<Arc<Model>> {
         let options = options(kind).n_styles(Truncation::Rank(2)).time_scaling(TimeScaling::Warp(TimeWarp::default()));
         learn(demos, &options)
     };
-    let mut at_once = options(Kind::Discrete).n_styles(Truncation::Rank(2));
-    at_once.canonical = immediate();
-    vec![
-        REACH.clone(),
-        CYCLE.clone(),
-        learn(&reaches(), &at_once),
-        warped(&reaches(), Kind::Discrete),
-        warped(&cycles(), Kind::Rhythmic),
-    ]
+    vec![REACH.clone(), CYCLE.clone(), at_once(), warped(&reaches(), Kind::Discrete), warped(&cycles(), Kind::Rhythmic)]
 }
 
 proptest! {
@@ -222,7 +326,7 @@ proptest! {
                 .collect();
             let conditions = BatchConditions::each(model.primitive(), &movements).unwrap();
             let grid = grid(dt, dt * (samples - 1) as f64);
-            let mut variables = variables(model.kind(), &conditions, orders);
+            let mut variables = variables(model.kind(), &conditions);
             variables.retain(|variable| !warped || *variable != WithRespectTo::Tau);
             let prepared = prepared(model, &conditions, grid);
             let cotangents: Vec<_> = (0..orders).map(|k| noise(prepared.shape(), seed + 9 + k as u64)).collect();
@@ -288,35 +392,6 @@ proptest! {
     }
 }
 
-/// The gradients by different τ, at phases of their own, are central differences of rollouts.
-#[test]
-fn gradients_by_different_tau_are_differences_of_rollouts() {
-    let phases = PerMovement::Each(ndarray::array![[0.3], [4.0]]);
-    let conditions = BatchConditions {
-        tau: Some(PerMovement::Each(ndarray::array![[0.12], [0.3]])),
-        phase: Some(phases),
-        velocity: Some(vec![0.4, 0.2]).map(PerMovement::All),
-        start: Some(vec![0.4, 0.2]).map(PerMovement::All),
-        ..BatchConditions::default()
-    };
-    let grid = grid(1e-3, 1.2);
-    let prepared = prepared(&CYCLE, &conditions, grid);
-    let cotangents: Vec<_> = (0..2).map(|k| noise(prepared.shape(), 5 + k)).collect();
-    let found = &gradients(&prepared, &[WithRespectTo::Tau], &cotangents)[0];
-    for b in 0..2 {
-        let one = Conditions { phase: rows(&conditions.phase, b).map(|row| row[0]), ..condition(&conditions, b) };
-        let tau = one.tau.unwrap();
-        let cost = |step: f64| {
-            let conditions = Conditions { tau: Some(tau * (1.0 + step)), ..one.clone() };
-            let moved = rollout(CYCLE.primitive(), &conditions, grid).unwrap();
-            let dot = |v: &Array3<f64>, y: &Array2<f64>| (&v.index_axis(Axis(0), b) * y).sum();
-            dot(&cotangents[0], &moved.position) + dot(&cotangents[1], &moved.velocity)
-        };
-        let (found, expected) = (found[[b, 0]], (cost(1e-5) - cost(-1e-5)) / (2e-5 * tau));
-        assert!((found - expected).abs() < 1e-5 * expected.abs().max(1.0), "{found} {expected}");
-    }
-}
-
 /// Cotangents of other layouts have the same gradients.
 #[test]
 fn cotangents_may_be_strided() {
@@ -352,7 +427,6 @@ fn invalid_products_are_rejected() {
     assert_eq!(refused(0..1, &[WithRespectTo::Amplitude], &[&valid]).as_deref(), Some("amplitude"));
     assert_eq!(refused(0..1, &[WithRespectTo::Velocity], &[&valid]).as_deref(), Some("velocity"));
     assert_eq!(refused(0..1, &[WithRespectTo::GoalVelocity], &[&valid]).as_deref(), Some("goal_velocity"));
-    assert_eq!(refused(0..1, &[WithRespectTo::Tau], &[&valid, &valid, &valid]).as_deref(), Some("tau"));
     let cancelled =
         prepared.vector_jacobian(0..1, &style, &[valid.view()], Threads::ONE, &mut |_| Err(Error::Interrupted));
     assert!(matches!(cancelled, Err(Error::Interrupted)));

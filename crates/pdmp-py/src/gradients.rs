@@ -33,8 +33,8 @@ impl Model {
     /// For a function L of the results of `rollouts`, with the cotangents v = ∂L/∂y, returns the vector-Jacobian products
     /// ∂L/∂x = Σ_t v(t)·∂y(t)/∂x of the conditions x. A movement is linear in all conditions but tau, so that the products
     /// are exact; no Jacobian is formed, and a call takes about as long as `rollouts`, also of movements that differ in tau,
-    /// phase or segment durations. With respect to tau, they hold at fixed times. `pdmp.autodiff` wraps both calls for torch
-    /// and jax.
+    /// phase or segment durations. With respect to tau, they hold at fixed times, for accelerations as in `jacobian`.
+    /// `pdmp.autodiff` wraps both calls for torch and jax.
     ///
     /// Parameters
     /// ----------
@@ -63,8 +63,8 @@ impl Model {
     /// ------
     /// ValueError
     ///     An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind of
-    ///     primitive; a velocity or start of which there is none to differentiate by; tau with accelerations or
-    ///     `segment_durations`; or a model with rotations.
+    ///     primitive; a velocity or start of which there is none to differentiate by; tau with `segment_durations`, which
+    ///     are given in place of it; or a model with rotations.
     /// TypeError
     ///     As in `rollouts`.
     ///

@@ -271,6 +271,10 @@ impl Model {
     /// style also on the amplitude, and that by the amplitude on the style. With respect to tau it is the derivative at
     /// fixed times, with velocities among the conditions constant. `rollouts_vjp` gives gradients without a Jacobian.
     ///
+    /// The derivative of accelerations with respect to tau contains the third derivative of y, which jumps where the clock
+    /// passes a knot of the forcing table or of the transport profile: at such a sample, its mean is used. At the end of a
+    /// movement that does not end at rest the accelerations jump, and the sample there has no derivative.
+    ///
     /// Parameters
     /// ----------
     /// wrt : {"style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude", "tau"}
@@ -297,8 +301,7 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     Conditions that `rollout` rejects, a condition of the other kind of primitive, several segment durations, or
-    ///     tau with accelerations.
+    ///     Conditions that `rollout` rejects, a condition of the other kind of primitive, or several segment durations.
     ///
     /// Examples
     /// --------

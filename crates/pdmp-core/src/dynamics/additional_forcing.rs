@@ -67,19 +67,24 @@ impl Table {
         Self { from, cells, cells_per_clock: cells as f64 / length, quintics }
     }
 
+    /// Returns the polynomial of a group at clock `u` and the position in its cell, `None` where there is none.
     #[inline(always)]
-    fn sample<T: Register>(&self, canonical: Canonical, group: usize, u: f64) -> FrameSample<T> {
+    fn quintic(&self, canonical: Canonical, group: usize, u: f64) -> Option<(&[F64x4; 6], f64)> {
         let since = u - self.from;
         let since = if let Canonical::Rhythmic { .. } = canonical { turn(since) } else { since };
         let position = since * self.cells_per_clock;
         // The cast saturates; the comparison is false for a clock before the beginning.
         let cell = position as usize;
         if !(position >= 0.0 && cell < self.cells) {
-            return FrameSample::default();
+            return None;
         }
-        let (t, scale) = (position - cell as f64, self.cells_per_clock);
-        let [a, b, c, d, e, f] = &self.quintics[cell * (self.quintics.len() / self.cells) + group];
-        let [a, b, c, d, e, f] = T::load_all([a, b, c, d, e, f]);
+        Some((&self.quintics[cell * (self.quintics.len() / self.cells) + group], position - cell as f64))
+    }
+
+    #[inline(always)]
+    fn sample<T: Register>(&self, canonical: Canonical, group: usize, u: f64) -> FrameSample<T> {
+        let Some(([a, b, c, d, e, f], t)) = self.quintic(canonical, group, u) else { return FrameSample::default() };
+        let ([a, b, c, d, e, f], scale) = (T::load_all([a, b, c, d, e, f]), self.cells_per_clock);
         FrameSample {
             value: a + (b + (c + (d + (e + f * t) * t) * t) * t) * t,
             slope: (b + (c * 2.0 + (d * 3.0 + (e * 4.0 + f * (5.0 * t)) * t) * t) * t) * scale,
@@ -154,6 +159,16 @@ impl AdditionalForcing {
             sum = FrameSample { value: sum.value + value, slope: sum.slope + slope, bend: sum.bend + bend };
         }
         sum
+    }
+
+    /// Returns δ‴ of a group at clock `u`, at a knot, where it jumps, that of a later clock.
+    pub(crate) fn third(&self, group: usize, u: f64) -> F64x4 {
+        self.tables.iter().fold(F64x4::ZERO, |sum, table| match table.quintic(self.canonical, group, u) {
+            Some(([_, _, _, d, e, f], t)) => {
+                sum + (*d * 6.0 + (*e * 24.0 + *f * (60.0 * t)) * t) * table.cells_per_clock.powi(3)
+            }
+            None => sum,
+        })
     }
 
     /// Returns the sum of both displacements.

@@ -50,6 +50,12 @@ impl Braking {
         [p, growth * (d * (1.0 - lambda * v) - lambda + stiffness * v)]
     }
 
+    /// Returns the second derivative of p·exp(α_z v), given the first.
+    pub(crate) fn forcing_bend(&self, v: f64, slope: f64) -> f64 {
+        let d = self.alpha_z - self.lambda;
+        d * slope + (d * v).exp() * (self.stiffness - self.lambda * d)
+    }
+
     /// Returns e = v·exp(−λv) and z = −α_zβ_z·h(v).
     pub(crate) fn state(&self, v: f64) -> State<f64> {
         State { e: v * (-self.lambda * v).exp(), z: -self.stiffness * self.h(v) }
@@ -132,15 +138,18 @@ mod tests {
         }
     }
 
-    /// The derivative is that of the value, and the series joins the closed form.
+    /// The derivatives are those of the value, and the series joins the closed form.
     #[test]
     fn braking_forcing_is_smooth() {
         let attractor = Attractor { alpha_z: 25.0, beta_z: 6.25 };
         for lambda in [5.0f64, 24.0, 100.0] {
             for v in [1e-3, 0.0199, MAX_SERIES / (25.0 - lambda).abs(), 0.03, 0.3] {
-                let [[below, _], [_, slope], [above, _]] =
-                    [-1e-6, 0.0, 1e-6].map(|by| Braking::new(attractor, 2.0 * lambda).forcing(v + by));
+                let braking = Braking::new(attractor, 2.0 * lambda);
+                let [[below, falling], [_, slope], [above, rising]] =
+                    [-1e-6, 0.0, 1e-6].map(|by| braking.forcing(v + by));
                 assert_relative_eq!((above - below) / 2e-6, slope, max_relative = 1e-6, epsilon = 1e-6);
+                let bend = braking.forcing_bend(v, slope);
+                assert_relative_eq!((rising - falling) / 2e-6, bend, max_relative = 1e-6, epsilon = 1e-4);
             }
         }
     }

@@ -39,14 +39,14 @@ pub struct ForcingTable {
     /// w = r·(a + b·p) past the end.
     pub(super) cubics: Vec<Cubic>,
     /// Form of the forcing past the end of a discrete movement.
-    ending: Ending,
+    pub(super) ending: Ending,
     /// Interpolation error, relative to the largest forcing.
     error: f64,
 }
 
 /// Form of the forcing at v = u − u_end past the end of a discrete movement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Ending {
+pub(super) enum Ending {
     /// Decay with the phase, w = w_end·exp(−α_x v), as in the paper.
     Phase,
     /// w = −z_end·exp(−α_z v) + v_end·p(v). The first part decays as z does, so that a movement which ends at rest on its

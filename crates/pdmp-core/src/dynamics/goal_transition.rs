@@ -162,6 +162,14 @@ impl GoalTransition {
         let bend = c * 2.0 + (d * 6.0 + (e * 12.0 + f * (20.0 * s)) * s) * s;
         FrameSample { value, slope: slope * scale, bend: bend * (scale * scale) }
     }
+
+    /// Returns q‴ of a group at clock `u` before the end of the transition.
+    pub(crate) fn third(&self, group: usize, u: f64) -> F64x4 {
+        let scale = 1.0 / (self.to - self.from);
+        let s = (u - self.from) * scale;
+        let [_, _, _, d, e, f] = self.coefficients[group];
+        (d * 6.0 + (e * 24.0 + f * (60.0 * s)) * s) * (scale * scale * scale)
+    }
 }
 
 impl<T: Real> FrameSample<T> {

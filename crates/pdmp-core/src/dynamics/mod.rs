@@ -6,6 +6,7 @@ pub(crate) mod braking;
 pub(crate) mod canonical;
 pub(crate) mod command_filter;
 mod forcing_block;
+mod forcing_slopes;
 pub(crate) mod forcing_table;
 pub(crate) mod forcing_transpose;
 pub(crate) mod goal_transition;

@@ -172,6 +172,11 @@ impl TransportSegment {
     pub(crate) fn lag(&self, u: f64) -> TransportSample {
         sample(&self.cubic, u - self.from)
     }
+
+    /// Returns ℓ‴, which is constant.
+    pub(crate) fn third(&self) -> f64 {
+        6.0 * self.cubic[3]
+    }
 }
 
 /// Evaluates a cubic and its derivatives.

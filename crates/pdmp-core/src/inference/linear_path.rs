@@ -137,7 +137,7 @@ impl<'a> LinearPath<'a> {
         responses: &'a Responses,
     ) -> Self {
         let duration = primitive.duration();
-        let curves = responses.0.each_ref().map(|curves| {
+        let curves = responses.orders.each_ref().map(|curves| {
             let Curves { styles, start, velocity, goal_velocity } = curves;
             let all = styles.iter().chain([start, velocity]).chain(goal_velocity);
             all.map(|curve| curve.as_slice().unwrap_or_default()).collect()

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use ndarray::Array2;
 
@@ -60,39 +60,76 @@ pub(crate) struct Curves {
     pub(crate) goal_velocity: Option<Array2<f64>>,
 }
 
+impl Curves {
+    /// Returns curves in the order of [`Self::iter`].
+    pub(crate) fn new(curves: Vec<Array2<f64>>, has_goal_velocity: bool) -> Self {
+        let mut curves = curves.into_iter();
+        let mut next = || curves.next().unwrap_or_default();
+        let (start, velocity) = (next(), next());
+        let goal_velocity = has_goal_velocity.then(next);
+        Self { start, velocity, goal_velocity, styles: curves.collect() }
+    }
+
+    /// Returns the responses to start, start velocity, final velocity if one is in force, and styles.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Array2<f64>> {
+        [&self.start, &self.velocity].into_iter().chain(&self.goal_velocity).chain(&self.styles)
+    }
+}
+
 /// Unit responses of positions, velocities and accelerations.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Responses(pub(crate) [Curves; 3]);
+pub(crate) struct Responses {
+    pub(crate) orders: [Curves; 3],
+    /// Third derivatives, once a gradient of accelerations with respect to τ has needed them.
+    third: OnceLock<Curves>,
+}
 
 impl Responses {
+    pub(crate) fn new(orders: [Curves; 3]) -> Self {
+        Self { orders, third: OnceLock::new() }
+    }
+
     /// Returns the responses of one derivative.
     pub(crate) fn of(&self, derivative: Derivative) -> &Curves {
-        &self.0[derivative as usize]
+        &self.orders[derivative as usize]
+    }
+
+    /// Returns the third derivatives, computed by the first call.
+    ///
+    /// # Errors
+    /// That of the computation.
+    pub(crate) fn third(&self, compute: impl FnOnce() -> Result<Curves>) -> Result<&Curves> {
+        match self.third.get() {
+            Some(curves) => Ok(curves),
+            // Concurrent calls compute equal curves.
+            None => compute().map(|curves| self.third.get_or_init(|| curves)),
+        }
     }
 
     /// Returns the responses with the displacement by an additional forcing as those of one more style; `step` is the interval of
     /// the samples on the clock, and `rate` that of the clock per second.
     pub(crate) fn with_forcing(&self, forcing: &AdditionalForcing, step: f64, rate: f64) -> Self {
-        let mut extended = self.clone();
-        let mut curves = [(); 3].map(|()| Array2::zeros(self.0[0].start.dim()));
+        let mut extended = Self::new(self.orders.clone());
+        let mut curves = [(); 3].map(|()| Array2::zeros(self.orders[0].start.dim()));
         for k in 0..curves[0].nrows() {
             for (order, jet) in forcing.displacement(k as f64 * step).into_iter().enumerate() {
                 let scale = rate.powi(order as i32);
                 curves[order].row_mut(k).iter_mut().zip(jet).for_each(|(to, x)| *to = scale * x);
             }
         }
-        extended.0.iter_mut().zip(curves).for_each(|(all, curve)| all.styles.push(curve));
+        extended.orders.iter_mut().zip(curves).for_each(|(all, curve)| all.styles.push(curve));
         extended
     }
 
     /// Returns responses without samples.
     pub(crate) fn none() -> Self {
         let none = || Array2::zeros((0, 0));
-        Self([(); 3].map(|()| Curves { styles: Vec::new(), start: none(), velocity: none(), goal_velocity: None }))
+        Self::new([(); 3].map(|()| Curves { styles: Vec::new(), start: none(), velocity: none(), goal_velocity: None }))
     }
 
     fn bytes(&self) -> usize {
-        self.0.iter().map(|curves| (curves.styles.len() + 3) * curves.start.len() * size_of::<f64>()).sum()
+        let all = self.orders.iter().chain(self.third.get());
+        all.map(|curves| (curves.styles.len() + 3) * curves.start.len() * size_of::<f64>()).sum()
     }
 }
 
@@ -136,6 +173,13 @@ impl Cache {
         self.with(|entries| {
             entries.retain(|(k, _)| *k != key);
             entries.push_back((key, Arc::clone(responses)));
+        });
+        self.evict_excess();
+    }
+
+    /// Evicts the least recently used responses beyond the limits.
+    pub(crate) fn evict_excess(&self) {
+        self.with(|entries| {
             while entries.len() > MAX_ENTRIES || entries.iter().map(|(_, r)| r.bytes()).sum::<usize>() > MAX_BYTES {
                 entries.pop_front();
             }
@@ -162,7 +206,7 @@ mod tests {
     fn responses(n: usize) -> Arc<Responses> {
         let curve = || Array2::zeros((n, 1));
         let curves = || Curves { styles: vec![curve()], start: curve(), velocity: curve(), goal_velocity: None };
-        Arc::new(Responses([(); 3].map(|()| curves())))
+        Arc::new(Responses::new([(); 3].map(|()| curves())))
     }
 
     fn key(steps: usize) -> Key {
@@ -189,6 +233,14 @@ mod tests {
         cache.insert(key(50), &responses(MAX_BYTES));
         assert!(cache.find(key(50)).is_none(), "an entry above the limit is inserted");
         assert!(cache.find(key(18)).is_some() && cache.find(key(19)).is_some(), "it evicts others");
+        // Two fit in without third derivatives, and one with them.
+        let larger = responses(MAX_BYTES / (12 * 8) * 7 / 16);
+        (30..32).for_each(|n| cache.insert(key(n), &larger));
+        assert!(cache.find(key(30)).is_some() && cache.find(key(31)).is_some());
+        larger.third(|| Ok(larger.of(Derivative::Position).clone())).unwrap();
+        larger.third(|| panic!("computed again")).unwrap();
+        cache.evict_excess();
+        assert!(cache.find(key(30)).is_none() && cache.find(key(31)).is_some());
     }
 
     /// An entry is found by its whole key only; the clone of a cache is empty.

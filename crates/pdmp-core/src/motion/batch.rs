@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use ndarray::{Array3, ArrayViewMut3, Axis, aview1, s};
 
+use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
@@ -61,11 +62,13 @@ pub struct Batch {
     pub(super) goal_velocities: Option<PerMovement>,
     /// Amplitudes r₀ (1,).
     pub(super) amplitudes: PerMovement,
-    /// True if the last curves of the responses are the displacement by an additional forcing.
-    is_forced: bool,
+    /// Additional forcing, whose displacement then is that of the last curves of the responses.
+    pub(super) forcing: Option<Arc<AdditionalForcing>>,
     pub(super) tau: f64,
     /// Sampling interval, in s.
     pub(super) dt: f64,
+    /// Primitive of the responses, in degrees of freedom.
+    pub(super) primitive: Arc<Primitive>,
     /// Primitive with rotations.
     pub(super) pose: Option<Arc<Primitive>>,
     /// Movements of different timings, which share no responses; those of the batch are then empty.
@@ -119,7 +122,8 @@ pub fn batch(
         n_samples,
         n_dofs: primitive.n_dofs(),
         responses,
-        is_forced: forcing.is_some(),
+        forcing,
+        primitive: Arc::clone(primitive),
         n_movements,
         kind: primitive.kind(),
         styles: style.unwrap_or(PerMovement::All(nominal.style)),
@@ -313,7 +317,7 @@ impl Batch {
 
     /// Returns the coefficients of movement `b`.
     pub(super) fn combination(&self, b: usize) -> Combination {
-        let displacement = self.is_forced.then_some(1.0);
+        let displacement = self.forcing.is_some().then_some(1.0);
         let amplitude = self.amplitudes.row(b)[0];
         let style: Vec<f64> = self.styles.row(b).iter().map(|s| amplitude * s).chain(displacement).collect();
         let centre = self.centres.row(b).to_vec();

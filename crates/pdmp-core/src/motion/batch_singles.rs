@@ -7,6 +7,7 @@ use ndarray::{ArrayView2, ArrayView3, ArrayViewMut3, Axis};
 use crate::error::Result;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
+use crate::motion::controller::third_derivative::third_derivative;
 use crate::motion::response_products::Product;
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::motion::transposed_rollout;
@@ -75,8 +76,12 @@ impl Singles {
             let mut product = transposed_rollout::products(&self.primitive, conditions, self.grid, &rows)?;
             if by_tau {
                 let movement = rollout(&self.primitive, conditions, self.grid)?;
-                let orders = [&movement.position, &movement.velocity, &movement.acceleration].map(row_major);
-                product.scaled_time = scaled_time(&rows, orders, self.grid.dt, n_dofs);
+                let slopes = [&movement.velocity, &movement.acceleration];
+                let third =
+                    (rows.len() > 2).then(|| third_derivative(&self.primitive, conditions, self.grid.dt, slopes));
+                let third = third.transpose()?;
+                let orders = [&movement.position, slopes[0], slopes[1]].into_iter().chain(&third);
+                product.scaled_time = scaled_time(&rows, orders.map(row_major), self.grid.dt, n_dofs);
             }
             products.push(product);
         }
@@ -85,14 +90,15 @@ impl Singles {
 }
 
 /// Returns Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ + Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩ of a movement with its cotangents.
-fn scaled_time(cotangents: &[&[f64]], orders: [&[f64]; 3], dt: f64, n_dofs: usize) -> f64 {
+fn scaled_time<'a>(cotangents: &[&[f64]], mut orders: impl Iterator<Item = &'a [f64]>, dt: f64, n_dofs: usize) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
-    let mut sum = 0.0;
-    for (k, v) in cotangents.iter().enumerate().take(2) {
+    let (mut sum, mut order) = (0.0, orders.next().unwrap_or_default());
+    for ((k, v), slopes) in cotangents.iter().enumerate().zip(orders) {
         if k > 0 {
-            sum += k as f64 * dot(orders[k], v);
+            sum += k as f64 * dot(order, v);
         }
-        let samples = v.chunks(n_dofs).zip(orders[k + 1].chunks(n_dofs)).enumerate();
+        order = slopes;
+        let samples = v.chunks(n_dofs).zip(slopes.chunks(n_dofs)).enumerate();
         sum += samples.fold(0.0, |sum, (t, (v, slope))| sum + t as f64 * dt * dot(slope, v));
     }
     sum

@@ -10,6 +10,7 @@ use crate::model::Coordinates;
 use crate::model::conditions::{Conditions, ResolvedConditions, reject_for_kind, reject_goal_velocity};
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
+use crate::motion::controller::third_derivative::third_derivative;
 use crate::motion::rollout::{TimeGrid, rollout};
 use crate::motion::unit_responses::responses;
 use crate::numerics::rotation::dot;
@@ -37,18 +38,11 @@ pub enum WithRespectTo {
 }
 
 impl WithRespectTo {
-    /// Refuses a condition that this kind of primitive does not have, and the derivative that needs a third one of time.
-    pub(crate) fn check(self, kind: Kind, highest: Derivative) -> Result<()> {
+    /// Refuses a condition that this kind of primitive does not have.
+    pub(crate) fn check(self, kind: Kind) -> Result<()> {
         reject_for_kind(kind, "goal", self == Self::Goal && kind == Kind::Rhythmic)?;
         reject_for_kind(kind, "anchor", self == Self::Anchor && kind == Kind::Discrete)?;
-        reject_for_kind(kind, "amplitude", self == Self::Amplitude && kind == Kind::Discrete)?;
-        if self == Self::Tau && highest == Derivative::Acceleration {
-            return Err(Error::Argument {
-                name: "tau",
-                problem: "does not apply to accelerations: their derivative by tau needs the jerk; use velocities",
-            });
-        }
-        Ok(())
+        reject_for_kind(kind, "amplitude", self == Self::Amplitude && kind == Kind::Discrete)
     }
 }
 
@@ -69,8 +63,13 @@ impl WithRespectTo {
 ///
 /// with the responses R to the unit styles, E to a unit start, V to a unit start velocity and G to a unit final velocity. If
 /// a final velocity is given, all responses keep it. The terms with E and V apply only if a start or a start velocity is
-/// given. τ scales time, and velocities given per second keep their values. `derivative` selects y, ẏ or ÿ. `progress` is
-/// called periodically with the completed fraction; an error it returns cancels the call.
+/// given. τ scales time, and velocities given per second keep their values. `derivative` selects y, ẏ or ÿ.
+///
+/// With respect to τ it is the derivative wherever one exists. At samples that fall on a knot of the forcing table or of the
+/// transport profile the slope of ÿ jumps, and its mean stands for it. A movement that ends with a velocity has no derivative
+/// of ÿ at the sample of its end, where ÿ jumps.
+///
+/// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
 ///
 /// ```
 /// # use pdmp_core::{Conditions, Demonstration, FitOptions, Kind, fit};
@@ -102,7 +101,7 @@ pub fn jacobian(
         return in_coordinates(coordinates, variable, derivative, conditions, grid, progress);
     }
     let kind = primitive.kind();
-    variable.check(kind, derivative)?;
+    variable.check(kind)?;
     if conditions.segment_durations.as_ref().is_some_and(|segment_durations| segment_durations.len() > 1) {
         return Err(Error::Argument {
             name: "segment_durations",
@@ -129,13 +128,13 @@ pub fn jacobian(
         WithRespectTo::Amplitude => by_amplitude(&responses, derivative, conditions),
         WithRespectTo::Tau => {
             let movement = rollout(primitive, given, grid)?;
-            by_tau(
-                &responses,
-                derivative,
-                &conditions,
-                [movement.position, movement.velocity, movement.acceleration],
-                grid,
-            )
+            let slopes = [&movement.velocity, &movement.acceleration];
+            let (own, slope) = match derivative {
+                Derivative::Position => (&movement.position, slopes[0]),
+                Derivative::Velocity => (slopes[0], slopes[1]),
+                Derivative::Acceleration => (slopes[1], &third_derivative(primitive, given, grid.dt, slopes)?),
+            };
+            by_tau(&responses, derivative, &conditions, [own, slope], grid)
         }
         WithRespectTo::Goal | WithRespectTo::Anchor if conditions.start.is_some() => {
             by_dof(&curves.start, |response| one - response)
@@ -182,12 +181,12 @@ fn by_amplitude(responses: &Responses, derivative: Derivative, conditions: Resol
     Ok(jacobian)
 }
 
-/// Returns the Jacobian (T, D, 1) with respect to τ of one order of a movement.
+/// Returns the Jacobian (T, D, 1) with respect to τ of one order of a movement, from that order and the next.
 fn by_tau(
     responses: &Responses,
     derivative: Derivative,
     conditions: &ResolvedConditions,
-    movement: [Array2<f64>; 3],
+    [own, slope]: [&Array2<f64>; 2],
     grid: TimeGrid,
 ) -> Result<Array3<f64>> {
     let (order, curves, rate) = (derivative as usize, responses.of(derivative), 1.0 / conditions.tau);
@@ -197,8 +196,8 @@ fn by_tau(
         let time = k as f64 * grid.dt;
         let given = conditions.velocity.as_ref().map_or(0.0, |velocity| velocity[d] * curves.velocity[[k, d]]);
         let last = curves.goal_velocity.as_ref().map_or(0.0, |curve| conditions.goal_velocity[d] * curve[[k, d]]);
-        let own = -(order as f64) * movement[order][[k, d]] - time * movement[order + 1][[k, d]];
-        *value = (own + given + last) * rate;
+        let moved = -(order as f64) * own[[k, d]] - time * slope[[k, d]];
+        *value = (moved + given + last) * rate;
     }
     Ok(jacobian)
 }

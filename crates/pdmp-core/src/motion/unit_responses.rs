@@ -17,12 +17,14 @@ use std::sync::Arc;
 
 use ndarray::{Array2, Array3, Array4, s};
 
+use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Curves, Derivative, Key, Responses};
 use crate::model::sensitivity::STEPS;
+use crate::motion::controller::third_derivative::third_derivative;
 use crate::motion::rollout::{TimeGrid, rollout_with};
 use crate::motion::trajectory::Trajectory;
 use crate::validate::zeros;
@@ -136,35 +138,63 @@ fn compute_responses(
     grid: TimeGrid,
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Responses> {
+    let units = unit_conditions(primitive, tau, has_goal_velocity, None);
+    let mut orders = [(); 3].map(|()| Vec::with_capacity(units.len()));
+    for (i, unit) in units.iter().enumerate() {
+        let mut progress = |share| progress((i as f64 + share) / units.len() as f64);
+        let Trajectory { position, velocity, acceleration, .. } = rollout_with(primitive, unit, grid, &mut progress)?;
+        orders.iter_mut().zip([position, velocity, acceleration]).for_each(|(curves, curve)| curves.push(curve));
+    }
+    Ok(Responses::new(orders.map(|curves| Curves::new(curves, has_goal_velocity))))
+}
+
+/// Returns the third derivatives of responses with respect to time, at intervals `dt`; those of a batch with an additional
+/// forcing have its displacement as their last style.
+///
+/// # Errors
+/// Derivatives that do not fit into memory.
+pub(crate) fn third_derivatives<'a>(
+    primitive: &Arc<Primitive>,
+    responses: &'a Responses,
+    tau: f64,
+    forcing: Option<&Arc<AdditionalForcing>>,
+    dt: f64,
+) -> Result<&'a Curves> {
+    let third = responses.third(|| {
+        let (velocities, accelerations) = (responses.of(Derivative::Velocity), responses.of(Derivative::Acceleration));
+        let has_goal_velocity = velocities.goal_velocity.is_some();
+        let units = unit_conditions(primitive, tau, has_goal_velocity, forcing);
+        let slopes = velocities.iter().zip(accelerations.iter());
+        let third = |(unit, (velocity, acceleration))| third_derivative(primitive, unit, dt, [velocity, acceleration]);
+        Ok(Curves::new(units.iter().zip(slopes).map(third).collect::<Result<_>>()?, has_goal_velocity))
+    });
+    primitive.responses.evict_excess();
+    third
+}
+
+/// Returns the conditions whose movements are the responses, in the order of [`Curves::iter`].
+fn unit_conditions(
+    primitive: &Primitive,
+    tau: f64,
+    has_goal_velocity: bool,
+    forcing: Option<&Arc<AdditionalForcing>>,
+) -> Vec<Conditions> {
     let (n_dofs, n_styles) = (primitive.n_dofs(), primitive.n_styles());
-    let n_runs = (n_styles + 3) as f64;
-    let mut run = |n_completed: usize, conditions: Conditions| {
-        let mut progress = |share| progress((n_completed as f64 + share) / n_runs);
-        let Trajectory { position, velocity, acceleration, .. } =
-            rollout_with(primitive, &conditions, grid, &mut progress)?;
-        Ok([position, velocity, acceleration])
-    };
     let vector = |value: f64| Some(vec![value; n_dofs]);
-    let style = Some(vec![0.0; n_styles]);
     let goal_velocity = vector(0.0).filter(|_| has_goal_velocity);
     let base = Conditions { goal_velocity, tau: Some(tau), ..about_zero(primitive) };
-    let zero = Conditions { style, start: vector(0.0), ..base.clone() };
-    let [start, start_slope, start_bend] = run(0, Conditions { start: vector(1.0), ..zero.clone() })?;
-    let [velocity, velocity_slope, velocity_bend] = run(1, Conditions { velocity: vector(1.0), ..zero.clone() })?;
-    let curves =
-        |start, velocity| Curves { styles: Vec::with_capacity(n_styles), start, velocity, goal_velocity: None };
-    let mut responses =
-        Responses([curves(start, velocity), curves(start_slope, velocity_slope), curves(start_bend, velocity_bend)]);
-    if has_goal_velocity {
-        let unit = run(2, Conditions { goal_velocity: vector(1.0), ..zero })?;
-        responses.0.iter_mut().zip(unit).for_each(|(curves, curve)| curves.goal_velocity = Some(curve));
+    let zero = Conditions { style: Some(vec![0.0; n_styles]), start: vector(0.0), ..base.clone() };
+    let first_style = 2 + usize::from(has_goal_velocity);
+    let mut units = vec![zero.clone(); first_style];
+    units[0].start = vector(1.0);
+    units[1].velocity = vector(1.0);
+    units[2..].iter_mut().for_each(|unit| unit.goal_velocity = vector(1.0));
+    units.resize(first_style + n_styles, base);
+    for (j, unit) in units[first_style..].iter_mut().enumerate() {
+        unit.style = Some((0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect());
     }
-    for j in 0..n_styles {
-        let style = (0..n_styles).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
-        let unit = run(j + 3, Conditions { style: Some(style), ..base.clone() })?;
-        responses.0.iter_mut().zip(unit).for_each(|(curves, curve)| curves.styles.push(curve));
-    }
-    Ok(responses)
+    units.extend(forcing.map(|forcing| Conditions { forcing: Some(Arc::clone(forcing)), ..zero }));
+    units
 }
 
 /// Returns conditions with goal and start, or anchor, of zero.

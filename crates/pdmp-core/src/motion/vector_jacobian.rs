@@ -9,7 +9,8 @@
 //! ∂L/∂τ = (−Σₖ k⟨v⁽ᵏ⁾, y⁽ᵏ⁾⟩ − Σₖ⟨t·v⁽ᵏ⁾, y⁽ᵏ⁺¹⁾⟩ + n·ẏ(0) + q·ẏ_g)/τ
 //! ```
 //!
-//! with the unit responses of `unit_responses`. The loops are those of `superposition`, transposed: no Jacobian is formed.
+//! with the unit responses of `unit_responses` and, for k = 2, the third derivative of the movement (`third_derivative` of the
+//! controller). The loops are those of `superposition`, transposed: no Jacobian is formed.
 //! Movements that differ in τ, in phase or in segment durations have no responses in common; the products of each are those of
 //! `transposed_rollout`.
 
@@ -18,13 +19,14 @@ use std::ops::Range;
 use ndarray::{Array2, ArrayView3, ArrayViewMut1, ArrayViewMut2, Axis, aview1, s};
 
 use crate::error::{Error, Result};
-use crate::model::responses::Derivative;
+use crate::model::responses::{Curves, Derivative};
 use crate::motion::batch::{BLOCK, Batch, MIN_MOVEMENTS_PER_BLOCK, PROGRESS_INTERVAL};
 use crate::motion::batch_conditions::PerMovement;
 use crate::motion::batch_singles::Singles;
 use crate::motion::jacobian::WithRespectTo;
 use crate::motion::response_products::{Product, timed_dot};
 use crate::motion::superposition::{Combination, Tile, tile_size};
+use crate::motion::unit_responses::third_derivatives;
 use crate::numerics::threads::Threads;
 use crate::validate::{row_major, zeros};
 
@@ -64,8 +66,8 @@ impl Batch {
     ///
     /// # Errors
     /// A range beyond the batch; cotangents of another number or shape, or that are not finite; a variable of the other
-    /// kind of primitive, or a velocity or start that the batch does not have; τ with accelerations or segment durations; a
-    /// primitive with rotations; or the error of `progress`.
+    /// kind of primitive, or a velocity or start that the batch does not have; τ with segment durations; a primitive with
+    /// rotations; or the error of `progress`.
     pub fn vector_jacobian(
         &self,
         movements: Range<usize>,
@@ -88,7 +90,10 @@ impl Batch {
             true => (0..n_samples).flat_map(|k| std::iter::repeat_n(k as f64 * self.dt, n_dofs)).collect(),
             false => Vec::new(),
         };
-        let work = Contraction { batch: self, time, by_tau };
+        let by_accelerations = by_tau && cotangents.len() > 2 && self.singles.is_none();
+        let third = by_accelerations
+            .then(|| third_derivatives(&self.primitive, &self.responses, self.tau, self.forcing.as_ref(), self.dt));
+        let work = Contraction { batch: self, time, by_tau, third: third.transpose()? };
         let in_block = (BLOCK / (n_samples * n_dofs)).max(MIN_MOVEMENTS_PER_BLOCK);
         let mut outputs: Vec<_> =
             gradients.iter_mut().map(|rows| rows.axis_chunks_iter_mut(Axis(0), in_block)).collect();
@@ -140,11 +145,12 @@ impl Batch {
             return wrong("cotangents", "must be one to three arrays, each (movements, samples, DoFs) of the batch");
         }
         for variable in variables {
-            variable.check(self.kind, Derivative::ALL[cotangents.len() - 1])?;
+            variable.check(self.kind)?;
             if *variable == WithRespectTo::Tau && self.singles.as_ref().is_some_and(Singles::is_warped) {
                 return wrong(
                     "tau",
-                    "does not apply to movements that follow segment_durations: pass tau in their place",
+                    "does not apply to movements that follow segment_durations, which are given in place of it: pass tau \
+                     instead of them to differentiate by it",
                 );
             }
             let (name, given) = match variable {
@@ -220,6 +226,8 @@ struct Contraction<'a> {
     /// Times (T·D,) of the elements of a movement, if τ is a variable.
     time: Vec<f64>,
     by_tau: bool,
+    /// Third derivatives of the responses, if τ is a variable of accelerations.
+    third: Option<&'a Curves>,
 }
 
 impl Contraction<'_> {
@@ -241,8 +249,11 @@ impl Contraction<'_> {
             for from in (0..length).step_by(tile) {
                 let at = from..(from + tile).min(length);
                 let part = Tile::new(batch.responses.of(order), at.clone());
-                let slope = Derivative::ALL.get(order as usize + 1).filter(|_| self.by_tau);
-                let slope = slope.map(|slope| Tile::new(batch.responses.of(*slope), at.clone()));
+                let slope = match Derivative::ALL.get(order as usize + 1) {
+                    Some(slope) => Some(batch.responses.of(*slope)).filter(|_| self.by_tau),
+                    None => self.third,
+                };
+                let slope = slope.map(|curves| Tile::new(curves, at.clone()));
                 let movements = combinations.iter().zip(&mut products).zip(row_major(&cotangents).chunks(length));
                 for ((combination, product), v) in movements {
                     let v = &v[at.clone()];

@@ -32,6 +32,7 @@ pub(in crate::motion) mod steady;
 mod step;
 pub(in crate::motion) mod substeps;
 mod synchronous;
+pub(in crate::motion) mod third_derivative;
 mod turning;
 
 use std::sync::Arc;
