@@ -16,8 +16,8 @@ use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::primitive::Primitive;
 use crate::numerics::rotation::{
-    Quaternion, Turning, Vector, add_scaled, cross, dot, exp, inverse, inverse_jacobian, jacobian, log_near, on_side_of,
-    product, rotate,
+    Quaternion, Turning, Vector, add_scaled, cross, dot, exp, inverse, inverse_jacobian, jacobian, log_near,
+    on_side_of, product, rotate,
 };
 use crate::numerics::rotation_transpose::{JacobianPath, turn_cotangent};
 use crate::validate::check_vector;

@@ -123,9 +123,7 @@ mod tests {
         };
         let slope = |k, i, step| (moved(k, i, step) - moved(k, i, -step)) / (2.0 * step);
         let step = 2e-4;
-        std::array::from_fn(|k| {
-            std::array::from_fn(|i| (4.0 * slope(k, i, step) - slope(k, i, 2.0 * step)) / 3.0)
-        })
+        std::array::from_fn(|k| std::array::from_fn(|i| (4.0 * slope(k, i, step) - slope(k, i, 2.0 * step)) / 3.0))
     }
 
     fn assert_close<const N: usize>(found: [Vector; N], expected: [Vector; N], tolerance: f64) {
