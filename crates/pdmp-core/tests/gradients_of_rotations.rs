@@ -169,7 +169,6 @@ fn gradients_are_differences_of_rollouts() {
                 }),
                 phase: (!discrete && !warped && own_time).then_some(1.7 * b as f64),
                 forcing: passage.conditions.forcing.clone().filter(|_| given % 4 > 1),
-                ..Conditions::default()
             };
             let movements: Vec<Conditions> = (0..2).map(|b| movement(b, random)).collect();
             let grid = grid(0.03, 1.35 * model.duration());
