@@ -5,7 +5,7 @@ use crate::dynamics::canonical::turn;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::model::conditions::{Conditions, ResolvedConditions};
-use crate::numerics::rotation::{Vector, add_scaled, cross, exp, inverse, normalised, rotate};
+use crate::numerics::rotation::{Vector, add_scaled, cross, inverse, normalised, rotate};
 use crate::numerics::rotation_transpose::{inverse_jacobian_pull_back, log_pull_back, quaternion_gradient};
 use crate::validate::check_vector;
 
@@ -172,7 +172,7 @@ impl Coordinates {
             if let Some(given) = place.velocity {
                 let (body, is_world) = (normalised(q), self.frame() == Frame::World);
                 let to_body = |v: Vector| if is_world { rotate(inverse(body), v) } else { v };
-                let carried = rotate(inverse(exp(delta)), rotation.mean.at(u).velocity).map(|x| rate * x);
+                let carried = rotation.carried(u, delta).map(|x| rate * x);
                 let own = add_scaled(to_body(rotation.read(given)), -1.0, carried);
                 let [by_own, by_residual] = inverse_jacobian_pull_back(delta, own, rotation.read(by_velocity));
                 by_delta = add_scaled(by_delta, 1.0, by_residual);

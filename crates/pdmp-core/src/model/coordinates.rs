@@ -85,11 +85,21 @@ impl Rotation {
         mean.times_exp(dofs.map(|dofs| self.read(dofs)))
     }
 
+    /// Returns [`Self::motion`] by a call, so that callers outside of the control loop stay small.
+    #[inline(never)]
+    fn turning(&self, u: f64, rates: [f64; 2], dofs: [&[f64]; 3]) -> Turning {
+        self.motion(u, rates, dofs)
+    }
+
+    /// Returns the velocity exp(δ)ᵀω̄ of the mean rotation in the body frame at clock `u`, per unit of the clock.
+    pub(super) fn carried(&self, u: f64, delta: Vector) -> Vector {
+        rotate(inverse(exp(delta)), self.mean.at(u).velocity)
+    }
+
     /// Returns δ and δ̇ of a motion at clock `u`, for the rate of the mean rotation. δ is that closest to `near`.
     pub(crate) fn residual(&self, u: f64, rate: f64, motion: &Turning, near: Vector) -> [Vector; 2] {
-        let mean = self.mean.at(u);
-        let delta = log_near(product(inverse(mean.rotation), motion.rotation), near);
-        let carried = rotate(inverse(exp(delta)), mean.velocity);
+        let delta = log_near(product(inverse(self.mean.at(u).rotation), motion.rotation), near);
+        let carried = self.carried(u, delta);
         [delta, inverse_jacobian(delta, add_scaled(motion.velocity, -rate, carried))]
     }
 }
@@ -214,7 +224,7 @@ impl Coordinates {
     ) {
         self.write_plain(dofs, position, velocity, acceleration);
         for rotation in &self.rotations {
-            self.write(rotation, rotation.motion(u, rates, dofs), position, velocity, acceleration);
+            self.write(rotation, rotation.turning(u, rates, dofs), position, velocity, acceleration);
         }
     }
 
@@ -276,7 +286,7 @@ impl Coordinates {
             velocities += flow * dofs[1][dof];
         }
         for rotation in &self.rotations {
-            let Turning { rotation: q, velocity, acceleration } = rotation.motion(u, rates, dofs);
+            let Turning { rotation: q, velocity, acceleration } = rotation.turning(u, rates, dofs);
             let q = on_side_of(q, rotation.columns.read(position));
             rotation.columns.write(q, position);
             let mut turn = turn_cotangent(q, rotation.columns.read(by_position));
@@ -313,8 +323,7 @@ impl Coordinates {
     pub(crate) fn for_each_drift(&self, u: f64, dofs: &[f64], mut visit: impl FnMut(usize, Vector)) {
         for rotation in &self.rotations {
             let delta = rotation.read(dofs);
-            let carried = rotate(inverse(exp(delta)), rotation.mean.at(u).velocity);
-            visit(rotation.dof, inverse_jacobian(delta, carried));
+            visit(rotation.dof, inverse_jacobian(delta, rotation.carried(u, delta)));
         }
     }
 

@@ -11,6 +11,7 @@
 //! and those in the world frame by Rε̇ and R(ε̈ + ω×ε̇). The derivative of J by δ has both orders of its two vectors:
 //! dJ(δ; dδ)v = dJ(δ; v)dδ + Jv×J dδ.
 
+// Functions outside of the control loop stay calls, so that the library stays small.
 use super::rotation::{
     Quaternion, Vector, add_scaled, cross, dot, inverse, jacobian_bends, jacobian_coefficients, product, shrinkage,
     unbounded_inverse_jacobian, vector,
@@ -26,7 +27,7 @@ pub(crate) struct JacobianPath {
 
 impl JacobianPath {
     /// Returns the path for δ, δ̇ and δ̈.
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn new(delta: [Vector; 3]) -> Self {
         let [place, slope, bend] = delta;
         let square = dot(place, place);
@@ -52,7 +53,7 @@ impl JacobianPath {
     }
 
     /// Returns the product of the transpose of the derivative of an order of J, up to 2, with a vector.
-    #[inline(always)]
+    #[inline(never)]
     fn transposed(&self, order: usize, v: Vector) -> Vector {
         let Self { delta, a, b, h } = self;
         let [x, y, z] = match order {
@@ -66,7 +67,6 @@ impl JacobianPath {
     }
 
     /// Returns the cotangents of δ, δ̇ and δ̈ for those of ε, ε̇ and ε̈.
-    #[inline(always)]
     pub(crate) fn pull_back(&self, [turn, flow, bend]: [Vector; 3]) -> [Vector; 3] {
         let [by_turn, by_flow, by_bend] = [turn, flow, bend].map(|v| self.transposed(0, v));
         let moved = add_scaled(self.transposed(1, flow), 1.0, self.transposed(2, bend));
