@@ -85,12 +85,6 @@ impl Rotation {
         mean.times_exp(dofs.map(|dofs| self.read(dofs)))
     }
 
-    /// Returns [`Self::motion`] by a call, so that callers outside of the control loop stay small.
-    #[inline(never)]
-    fn turning(&self, u: f64, rates: [f64; 2], dofs: [&[f64]; 3]) -> Turning {
-        self.motion(u, rates, dofs)
-    }
-
     /// Returns the velocity exp(δ)ᵀω̄ of the mean rotation in the body frame at clock `u`, per unit of the clock.
     pub(super) fn carried(&self, u: f64, delta: Vector) -> Vector {
         rotate(inverse(exp(delta)), self.mean.at(u).velocity)
@@ -224,7 +218,7 @@ impl Coordinates {
     ) {
         self.write_plain(dofs, position, velocity, acceleration);
         for rotation in &self.rotations {
-            self.write(rotation, rotation.turning(u, rates, dofs), position, velocity, acceleration);
+            self.write(rotation, rotation.motion(u, rates, dofs), position, velocity, acceleration);
         }
     }
 
@@ -265,35 +259,31 @@ impl Coordinates {
         rotation.write(moved.acceleration, acceleration);
     }
 
-    /// Passes the cotangents of the motion that [`Self::motion`] writes to those of the motion of the DoFs. Returns the
-    /// products of the cotangents of position and velocity with their derivatives by time, and of that of the velocity with it.
-    #[inline(always)]
+    /// Passes the cotangents of position, velocity and acceleration to those of the motion of the DoFs, of which
+    /// [`Self::motion`] made them. Returns the products of the cotangents of position and velocity with their derivatives by
+    /// time, and of that of the velocity with it.
     pub(crate) fn pull_back(
         &self,
-        u: f64,
-        rates: [f64; 2],
         dofs: [&[f64]; 3],
-        position: &mut [f64],
-        cotangents: [&[f64]; 3],
+        [position, velocity, acceleration]: [&[f64]; 3],
+        [by_position, by_velocity, by_acceleration]: [&[f64]; 3],
         by_dofs: &mut [Vec<f64>; 3],
     ) -> [f64; 2] {
-        let [by_position, by_velocity, by_acceleration] = cotangents;
         let (mut slopes, mut velocities) = (0.0, 0.0);
         for &[column, dof] in &self.plain {
             let [v, flow, bend] = [by_position[column], by_velocity[dof], by_acceleration[dof]];
             by_dofs.iter_mut().zip([v, flow, bend]).for_each(|(to, v)| to[dof] = v);
-            slopes += v * dofs[1][dof] + flow * dofs[2][dof];
-            velocities += flow * dofs[1][dof];
+            slopes += v * velocity[dof] + flow * acceleration[dof];
+            velocities += flow * velocity[dof];
         }
         for rotation in &self.rotations {
-            let Turning { rotation: q, velocity, acceleration } = rotation.turning(u, rates, dofs);
-            let q = on_side_of(q, rotation.columns.read(position));
-            rotation.columns.write(q, position);
+            let q = rotation.columns.read(position);
             let mut turn = turn_cotangent(q, rotation.columns.read(by_position));
-            let [mut flow, mut bend] = [by_velocity, by_acceleration].map(|by| rotation.read(by));
+            let mut vectors = [velocity, acceleration, by_velocity, by_acceleration].map(|row| rotation.read(row));
             if self.frame == Frame::World {
-                [flow, bend] = [flow, bend].map(|v| rotate(inverse(q), v));
+                vectors = vectors.map(|v| rotate(inverse(q), v));
             }
+            let [velocity, acceleration, mut flow, bend] = vectors;
             slopes += dot(turn, velocity) + dot(flow, acceleration);
             velocities += dot(flow, velocity);
             if self.frame == Frame::Body {

@@ -1,6 +1,7 @@
 //! Batches of a primitive with rotations: movements of the degrees of freedom, converted to coordinates sample by sample, and
 //! cotangents converted back.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use ndarray::{Array2, Array3, ArrayView3, ArrayViewMut1, ArrayViewMut3, Axis, aview1, s};
@@ -22,6 +23,9 @@ pub(super) struct Poses {
     pub(super) primitive: Arc<Primitive>,
     pub(super) conditions: BatchConditions,
 }
+
+/// Function of the motion at a sample.
+type Visit<'a> = dyn FnMut(&Coordinates, [usize; 2], [&[f64]; 3], &[Vec<f64>; 3]) + 'a;
 
 /// Cotangents of the motion of the DoFs of consecutive movements.
 pub(super) struct DofCotangents {
@@ -46,23 +50,12 @@ impl Poses {
 impl Batch {
     /// Writes movements that share responses from `first` on, in coordinates.
     pub(super) fn write_poses(&self, poses: &Poses, first: usize, mut outputs: Vec<ArrayViewMut3<f64>>) -> Result<()> {
-        let Some(coordinates) = poses.primitive.coordinates() else { return Ok(()) };
-        let ((_, n_samples, n_dofs), rate) = (self.shape(), 1.0 / self.tau);
-        let n = outputs.first().map_or(0, |output| output.len_of(Axis(0)));
-        let mut dofs = self.new_dofs();
-        let mut moved = [vec![0.0; coordinates.n_coordinates()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
-        for b in 0..n {
-            self.write_dofs(coordinates, first + b, &mut dofs[..outputs.len()])?;
-            moved[0].fill(0.0);
-            for k in 0..n_samples {
-                let ([position, velocity, acceleration], u) = (&mut moved, k as f64 * self.dt * rate);
-                coordinates.motion(u, [rate, 0.0], rows(&dofs, k), position, velocity, acceleration);
-                for (output, moved) in outputs.iter_mut().zip(&moved) {
-                    output.slice_mut(s![b, k, ..]).assign(&aview1(moved));
-                }
+        let (n, n_orders) = (outputs.first().map_or(0, |output| output.len_of(Axis(0))), outputs.len());
+        self.for_each_pose(poses, first..first + n, n_orders, &mut |_, [b, k], _, moved| {
+            for (output, moved) in outputs.iter_mut().zip(moved) {
+                output.slice_mut(s![b, k, ..]).assign(&aview1(moved));
             }
-        }
-        Ok(())
+        })
     }
 
     /// Converts the cotangents of movements from `first` on to those of the DoFs.
@@ -73,36 +66,55 @@ impl Batch {
         cotangents: &[ArrayView3<f64>],
         by_tau: bool,
     ) -> Result<DofCotangents> {
-        let mut found = DofCotangents { orders: Vec::new(), scaled_times: Vec::new() };
-        let Some(coordinates) = poses.primitive.coordinates() else { return Ok(found) };
         let ((_, n_samples, n_dofs), n) = (self.shape(), cotangents[0].len_of(Axis(0)));
-        found.orders.resize(cotangents.len(), Array3::zeros((n, n_samples, n_dofs)));
+        let mut found = DofCotangents {
+            orders: vec![Array3::zeros((n, n_samples, n_dofs)); cotangents.len()],
+            scaled_times: vec![0.0; n],
+        };
         let cotangents: Vec<_> = cotangents.iter().map(|array| array.as_standard_layout()).collect();
-        let (mut dofs, n_orders) = (self.new_dofs(), (cotangents.len() + usize::from(by_tau)).min(3));
+        // A change of τ moves each order along the next.
+        let n_orders = (cotangents.len() + usize::from(by_tau)).min(3);
         let zeros = vec![0.0; n_dofs];
         let mut by_dofs = [(); 3].map(|()| zeros.clone());
-        let mut position = vec![0.0; coordinates.n_coordinates()];
-        for b in 0..n {
-            self.write_dofs(coordinates, first + b, &mut dofs[..n_orders])?;
-            position.fill(0.0);
-            let mut scaled_time = 0.0;
-            for (k, [u, rates @ ..]) in self.clock(first + b, n_samples)?.into_iter().enumerate() {
-                let sample = b * n_samples + k;
-                let mut given = [&zeros[..]; 3];
-                for (given, array) in given.iter_mut().zip(&cotangents) {
-                    let n = array.len_of(Axis(2));
-                    *given = &row_major(array)[sample * n..][..n];
-                }
-                let [slopes, velocities] =
-                    coordinates.pull_back(u, rates, rows(&dofs, k), &mut position, given, &mut by_dofs);
-                scaled_time += k as f64 * self.dt * slopes + velocities;
-                for (array, row) in found.orders.iter_mut().zip(&by_dofs) {
-                    row_major_mut(array)[sample * n_dofs..][..n_dofs].copy_from_slice(row);
-                }
+        self.for_each_pose(poses, first..first + n, n_orders, &mut |coordinates, [b, k], dofs, moved| {
+            let sample = b * n_samples + k;
+            let mut given = [&zeros[..]; 3];
+            for (given, array) in given.iter_mut().zip(&cotangents) {
+                let n = array.len_of(Axis(2));
+                *given = &row_major(array)[sample * n..][..n];
             }
-            found.scaled_times.push(scaled_time);
-        }
+            let moved = moved.each_ref().map(|row| &row[..]);
+            let [slopes, velocities] = coordinates.pull_back(dofs, moved, given, &mut by_dofs);
+            found.scaled_times[b] += k as f64 * self.dt * slopes + velocities;
+            for (array, row) in found.orders.iter_mut().zip(&by_dofs) {
+                row_major_mut(array)[sample * n_dofs..][..n_dofs].copy_from_slice(row);
+            }
+        })?;
         Ok(found)
+    }
+
+    /// Calls a function with the coordinates, index in the range and sample, and the motion of the DoFs and of the coordinates
+    /// at each sample of a range of movements. Derivatives from `n_orders` on are not those of the movement.
+    fn for_each_pose(&self, poses: &Poses, movements: Range<usize>, n_orders: usize, visit: &mut Visit) -> Result<()> {
+        let Some(coordinates) = poses.primitive.coordinates() else { return Ok(()) };
+        let (_, n_samples, n_dofs) = self.shape();
+        let mut dofs = [(); 3].map(|()| Array2::zeros((n_samples, n_dofs)));
+        let mut moved = [vec![0.0; coordinates.n_coordinates()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
+        let mut clock = Vec::new();
+        for (index, b) in movements.enumerate() {
+            if index == 0 || self.singles.is_some() {
+                clock = self.clock(b, n_samples)?;
+            }
+            self.write_dofs(coordinates, b, &mut dofs[..n_orders])?;
+            moved[0].fill(0.0);
+            for (k, &[u, rates @ ..]) in clock.iter().enumerate() {
+                let row = dofs.each_ref().map(|dofs| &row_major(dofs)[k * n_dofs..][..n_dofs]);
+                let [position, velocity, acceleration] = &mut moved;
+                coordinates.motion(u, rates, row, position, velocity, acceleration);
+                visit(coordinates, [index, k], row, &moved);
+            }
+        }
+        Ok(())
     }
 
     /// Writes the gradient by a condition of movement `b` that is a position or a velocity, or by τ.
@@ -134,12 +146,6 @@ impl Batch {
         Ok(())
     }
 
-    /// Returns memory for the motion of the DoFs of a movement, zeros.
-    fn new_dofs(&self) -> [Array2<f64>; 3] {
-        let (_, n_samples, n_dofs) = self.shape();
-        [(); 3].map(|()| Array2::zeros((n_samples, n_dofs)))
-    }
-
     /// Writes the motion of the DoFs of movement `b`, up to an order.
     fn write_dofs(&self, coordinates: &Coordinates, b: usize, dofs: &mut [Array2<f64>]) -> Result<()> {
         if let Some(singles) = &self.singles {
@@ -162,9 +168,4 @@ impl Batch {
             None => Ok((0..n).map(|k| [k as f64 * self.dt * rate, rate, 0.0]).collect()),
         }
     }
-}
-
-/// Returns the rows of a sample.
-fn rows(dofs: &[Array2<f64>; 3], k: usize) -> [&[f64]; 3] {
-    dofs.each_ref().map(|dofs| &row_major(dofs)[k * dofs.ncols()..][..dofs.ncols()])
 }
