@@ -174,9 +174,7 @@ def jax_rollouts(
         def call(given: dict[str, Any]) -> tuple[Any, ...]:
             return tuple(array.astype(dtype) for array in work.forward(_as_numpy(given)))
 
-        made: tuple[Any, ...] = jax.pure_callback(
-            call, shapes, values, vmap_method="sequential"
-        )
+        made: tuple[Any, ...] = jax.pure_callback(call, shapes, values, vmap_method="sequential")
         return made
 
     def backward(values: dict[str, Any], cotangents: tuple[Any, ...]) -> tuple[dict[str, Any]]:
