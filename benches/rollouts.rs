@@ -9,6 +9,7 @@ use criterion::measurement::WallTime;
 use criterion::{BatchSize, BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use movements::movements;
 use ndarray::{Array2, Array3};
+use pdmp_core::demonstration::{QuaternionOrder, RotationColumns};
 use pdmp_core::learning::Truncation;
 use pdmp_core::learning::regression::{Basis, NGnet};
 use pdmp_core::model::Derivative;
@@ -17,7 +18,7 @@ use pdmp_core::motion::jacobian;
 use pdmp_core::motion::{Batch, BatchConditions, PerMovement, TimeGrid, WithRespectTo};
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
-use pdmp_core::{Conditions, FitOptions, Model, fit};
+use pdmp_core::{Conditions, Demonstration, FitOptions, Model, Sampling, fit};
 
 fn learn(n_styles: usize) -> Arc<Model> {
     let options = FitOptions::discrete().n_styles(Truncation::Rank(n_styles)).basis(Basis::NGnet(NGnet::default()));
@@ -113,6 +114,7 @@ fn rollouts(criterion: &mut Criterion) {
         });
     }
     with_accelerations(&mut group, "100", ", each with its tau", &batch, &variables);
+    poses(&mut group);
     let jacobian = |model: &Arc<Model>| {
         let (variable, derivative) = (WithRespectTo::Style, Derivative::Position);
         jacobian(model.primitive(), variable, derivative, &Conditions::default(), grid, &mut |_| Ok(()))
@@ -122,6 +124,62 @@ fn rollouts(criterion: &mut Criterion) {
         bench.iter_batched(|| Arc::new(Model::clone(&model)), |model| jacobian(&model), BatchSize::SmallInput);
     });
     group.finish();
+}
+
+/// Batches of a pose, and of a pose each with its τ.
+fn poses(group: &mut BenchmarkGroup<WallTime>) {
+    let options = FitOptions::discrete().n_styles(Truncation::Rank(3)).basis(Basis::NGnet(NGnet::default()));
+    let model = fit(&movements(40, 1001).iter().map(pose).collect::<Vec<_>>(), &options).expect("a fit");
+    let vectors = |n, columns| Array2::from_shape_fn((n, columns), |(b, j)| (b + j) as f64 / n as f64);
+    let variables = [WithRespectTo::Style, WithRespectTo::Goal, WithRespectTo::Start, WithRespectTo::Tau];
+    for (n, kind) in [(1000, "poses"), (100, "poses, each with its tau")] {
+        let own = Array2::from_shape_fn((n, 1), |(b, _)| model.tau() * (0.8 + 0.004 * b as f64));
+        let conditions = BatchConditions {
+            style: Some(PerMovement::Each(vectors(n, 3))),
+            tau: (n == 100).then_some(PerMovement::Each(own)),
+            ..BatchConditions::default()
+        };
+        let grid = TimeGrid { dt: 1e-3, duration: Some(1.0) };
+        let batch = batch(model.primitive(), conditions, grid, &mut |_| Ok(())).expect("a batch");
+        let new = |order: Derivative| Array3::from_elem((n, batch.shape().1, batch.n_columns(order)), 0.5);
+        let mut outputs = Derivative::ALL.map(new);
+        let cotangents = Derivative::ALL.map(new);
+        for n_orders in 1..=3 {
+            let suffix = ["", " with velocities", " with velocities and accelerations"][n_orders - 1];
+            group.bench_function(format!("{n} {kind}, rollouts{suffix}"), |bench| {
+                bench.iter(|| {
+                    let outputs = outputs.iter_mut().take(n_orders).map(|output| output.view_mut()).collect();
+                    batch.write(0..n, outputs, Threads::ONE, &mut |_| Ok(()))
+                });
+            });
+            let views: Vec<_> = cotangents.iter().take(n_orders).map(|array| array.view()).collect();
+            for (name, variables) in [("", &variables[..3]), (" and tau", &variables[..])] {
+                if n_orders == 3 && variables.len() == 4 {
+                    continue;
+                }
+                group.bench_function(format!("{n} {kind}, gradients by style, goal, start{name}{suffix}"), |bench| {
+                    bench.iter(|| batch.vector_jacobian(0..n, variables, &views, Threads::ONE, &mut |_| Ok(())));
+                });
+            }
+        }
+    }
+}
+
+/// Returns a movement whose last four columns are a unit quaternion.
+fn pose(movement: &Demonstration) -> Demonstration {
+    let position = movement.position();
+    let rotated = Array2::from_shape_fn((position.nrows(), 7), |(c, d)| {
+        let vector: [f64; 3] = std::array::from_fn(|i| 0.3 * position[[c, 3 + i]]);
+        let angle = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+        match d {
+            0..3 => position[[c, d]],
+            3 => (0.5 * angle).cos(),
+            _ => vector[d - 4] * if angle > 0.0 { (0.5 * angle).sin() / angle } else { 0.5 },
+        }
+    });
+    let rotations = vec![RotationColumns { column: 3, order: QuaternionOrder::Wxyz }];
+    let demo = Demonstration::new(rotated, Sampling::Uniform { dt: 1e-3 }).expect("finite");
+    demo.with_rotations(rotations).expect("unit quaternions")
 }
 
 criterion_group!(benches, rollouts);

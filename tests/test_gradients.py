@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pdmp
+from synthetic import DT
 
 RNG = np.random.default_rng(0)
 STYLES = RNG.normal(size=(7, 2))
@@ -29,6 +30,51 @@ def cotangents(movements: tuple[Any, ...]) -> tuple[Any, ...]:
     """Returns the derivatives of `cost`."""
     positions, velocities, accelerations = movements
     return 2 * positions + 3 * positions**2, 0.2 * velocities, 2e-3 * accelerations
+
+
+def pose(phase: Any, turn: Any, lean: float) -> Any:
+    """Returns quaternions x, y, z, w that turn about z and lean, and two coordinates."""
+    z, x = turn / 2, lean * np.sin(phase) ** 2 / 2
+    quaternion = [np.sin(x) * np.cos(z), np.sin(x) * np.sin(z), np.cos(x) * np.sin(z)]
+    return np.column_stack(
+        [*quaternion, np.cos(x) * np.cos(z), np.sin(phase), lean * np.cos(phase)]
+    )
+
+
+@pytest.fixture(scope="module", params=["discrete", "rhythmic"])
+def poses(request: pytest.FixtureRequest) -> pdmp.Model:
+    """Returns a model of a rotation and two coordinates, with angular velocities in the world."""
+    kind: Any = request.param
+    s = np.linspace(0, 1, 81, endpoint=kind == "discrete")
+    if kind == "discrete":
+        phase, turn = np.pi * s, 3.5 * s**3 * (10 - 15 * s + 6 * s**2)
+    else:
+        phase, turn = 2 * np.pi * s, 0.8 * np.sin(2 * np.pi * s)
+    demos = [
+        pdmp.Demonstration(pose(phase, turn * (1 + lean / 4), lean), dt=DT, rotations={0: "xyzw"})
+        for lean in (-0.6, -0.2, 0.3, 0.7)
+    ]
+    return pdmp.fit(demos, kind=kind, n_styles=2, rotation_frame="world")
+
+
+def posed_for(model: pdmp.Model) -> dict[str, Any]:
+    """Returns conditions of a batch of poses with velocities, some shared."""
+
+    def places(*shape: int) -> Any:
+        quaternions = RNG.normal(size=(*shape, 4))
+        quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
+        return np.concatenate([quaternions, RNG.normal(size=(*shape, 2))], axis=-1)
+
+    given: dict[str, Any] = {
+        "style": RNG.uniform(-0.5, 0.5, size=(3, 2)),
+        centre_of(model): places(3),
+        "start": places(),
+        "velocity": RNG.normal(size=(3, 5)),
+        "tau": model.tau * np.linspace(0.7137, 1.9, 3),
+    }
+    if model.kind == "discrete":
+        return {**given, "goal_velocity": RNG.normal(size=5)}
+    return {**given, "amplitude": np.linspace(0.3, 2.0, 3)}
 
 
 def difference(model: pdmp.Model, given: dict[str, Any], name: str, options: Any) -> Any:
@@ -85,6 +131,38 @@ def test_gradients_are_differences_of_costs(model: pdmp.Model, conditions: Any) 
         total = gradient if np.ndim(given[name]) == gradient.ndim else gradient.sum(axis=0)
         assert total.shape == expected.shape
         np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())
+
+
+@pytest.mark.parametrize("shares_tau", [True, False])
+def test_gradients_of_poses_are_differences_of_costs(poses: pdmp.Model, shares_tau: bool) -> None:
+    """Rotations have gradients by every condition, those by a quaternion orthogonal to it."""
+    given = posed_for(poses)
+    if shares_tau:
+        given["tau"] = 1.3 * poses.tau
+    options: dict[str, Any] = {"dt": 0.01, "duration": 1.7}
+    wrt: Any = list(given)
+    movements = poses.rollouts(**given, **options)
+    found = poses.rollouts_vjp(wrt, cotangents(movements), **given, **options)
+    for name, gradient in zip(wrt, found, strict=True):
+        expected = difference(poses, given, name, options)
+        total = gradient if np.ndim(given[name]) == gradient.ndim else gradient.sum(axis=0)
+        assert total.shape == expected.shape
+        np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())
+        if name in ("goal", "anchor", "start"):
+            along = (gradient * given[name])[:, :4].sum(axis=1)
+            np.testing.assert_allclose(along, 0.0, atol=1e-12 * abs(gradient).max())
+    along = movements[0].copy()
+    along[:, :, 4:] = 0.0
+    for gradient in poses.rollouts_vjp(wrt, along, **given, **options):
+        np.testing.assert_allclose(gradient, 0.0, atol=1e-11)
+
+
+def test_accelerations_of_poses_have_no_gradient_by_tau(poses: pdmp.Model) -> None:
+    """A change of tau needs the jerk, which rotations do not have; other gradients need none."""
+    movements = poses.rollouts(derivatives=2)
+    assert poses.rollouts_vjp("style", movements)[0].shape == (1, 2)
+    with pytest.raises(ValueError, match="tau does not apply to accelerations"):
+        poses.rollouts_vjp("tau", movements)
 
 
 def test_a_jacobian_is_that_from_phase_0(cycle: pdmp.Model) -> None:
@@ -205,6 +283,19 @@ def test_jax_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
         )
 
 
+def test_jax_checks_gradients_of_poses(poses: pdmp.Model) -> None:
+    """`jax.test_util.check_grads` accepts gradients of rotations and angular velocities."""
+    jax = pytest.importorskip("jax")
+    check_grads = pytest.importorskip("jax.test_util").check_grads
+    with jax.enable_x64(True):
+        given = {n: jax.numpy.asarray(v, dtype=float) for n, v in posed_for(poses).items()}
+        move = pdmp.autodiff.jax_rollouts(poses, derivatives=1, dt=0.41, duration=1.7)
+        move = jax.jit(move)
+        check_grads(
+            lambda given: move(**given), (given,), 1, ["rev"], eps=1e-6, atol=1e-6, rtol=1e-5
+        )
+
+
 def test_jax_keeps_single_precision(reach: pdmp.Model) -> None:
     """Conditions in single precision have movements and gradients in it."""
     jax = pytest.importorskip("jax")
@@ -244,6 +335,23 @@ def test_torch_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
 
     tensors = [value.requires_grad_() for value in given.values()]
     assert torch.autograd.gradcheck(moved, tensors, eps=1e-6, atol=1e-6, rtol=1e-5)
+
+
+def test_torch_checks_gradients_of_poses(poses: pdmp.Model) -> None:
+    """`torch.autograd.gradcheck` accepts gradients of rotations and their derivatives."""
+    torch = pytest.importorskip("torch")
+    given = {name: torch.tensor(value).double() for name, value in posed_for(poses).items()}
+    for derivatives in (1, 2):
+        move = pdmp.autodiff.torch_rollouts(poses, derivatives=derivatives, dt=0.05, duration=1.7)
+        names = [name for name in given if derivatives < 2 or name != "tau"]
+
+        def moved(*values: Any, move: Any = move, names: Any = names) -> Any:
+            return move(**{**given, **dict(zip(names, values, strict=True))})
+
+        tensors = [given[name].clone().requires_grad_() for name in names]
+        assert torch.autograd.gradcheck(
+            moved, tensors, eps=1e-6, atol=1e-5, rtol=1e-5, fast_mode=True
+        )
 
 
 def test_torch_keeps_types(reach: pdmp.Model) -> None:

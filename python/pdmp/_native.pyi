@@ -1310,12 +1310,17 @@ class Model:
         phase or segment durations. With respect to tau, they hold at fixed times, for accelerations as in `jacobian`.
         `pdmp.autodiff` wraps both calls for torch and jax.
 
+        In a model with rotations, the gradient by a unit quaternion q of a goal, anchor or start is that of L as a function of
+        q/|q|, orthogonal to q, and the part of a cotangent along its quaternion has no effect. Velocities are angular
+        velocities in the frame of the model.
+
         Parameters
         ----------
         wrt : str or sequence of str
             Conditions x: "style", "goal", "anchor", "start", "velocity", "goal_velocity", "amplitude" or "tau".
         cotangents : array_like, (B, T, D), or tuple of array_like
-            ∂L/∂y of the positions, or of positions, velocities and accelerations as far as L depends on them.
+            ∂L/∂y of the positions, or of positions, velocities and accelerations as far as L depends on them, of the shapes
+            that `rollouts` returns: with rotations, positions have a column for each coordinate.
         conditions : Conditions, or B Conditions, optional
             As in `rollouts`.
         context : array_like or list, (Q,) or (B, Q), optional
@@ -1330,15 +1335,16 @@ class Model:
         Returns
         -------
         tuple of ndarray
-            ∂L/∂x in the order of `wrt`: (B, J) for the style, (B,) for amplitude and tau, else (B, D). Row b is the
-            gradient by the condition of movement b; the gradient by a condition that all share is the sum of the rows.
+            ∂L/∂x in the order of `wrt`, of the shape of B of these conditions: (B, J) for the style, (B,) for amplitude and
+            tau, else (B, D). Row b is the gradient by the condition of movement b; the gradient by a condition that all share
+            is the sum of the rows.
 
         Raises
         ------
         ValueError
             An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind of
             primitive; a velocity or start of which there is none to differentiate by; tau with `segment_durations`, which
-            are given in place of it; or a model with rotations.
+            are given in place of it; or tau with accelerations of a model with rotations.
         TypeError
             As in `rollouts`.
 

@@ -35,7 +35,7 @@ def torch_rollouts(
     Parameters
     ----------
     model : Model
-        Model without rotations.
+        Model, also with rotations.
     conditions : Conditions, optional
         Conditions of all movements that the function is not given.
     dt : float
@@ -52,9 +52,11 @@ def torch_rollouts(
     callable
         Function of conditions by name, each a tensor (n,) or (B, n); `tau` and `amplitude` are
         scalars or (B,). It returns a tuple of tensors (B, T, D): positions, and the derivatives
-        asked for.
-        Gradients with respect to `tau` hold at fixed times, for accelerations as in
-        `Model.jacobian`. Second derivatives are not available.
+        asked for, of the shapes of `Model.rollouts`.
+        The gradient with respect to a unit quaternion q is that of the function of q/|q|,
+        orthogonal to q. Gradients with respect to `tau` hold at fixed times, for accelerations as
+        in `Model.jacobian`, and without those of rotations. Second derivatives are not
+        available.
 
     Raises
     ------
@@ -135,9 +137,11 @@ def jax_rollouts(
     callable
         Function of conditions by name, each an array (n,) or (B, n); `tau` and `amplitude` are
         scalars or (B,). It returns a tuple of arrays (B, T, D): positions, and the derivatives
-        asked for.
-        Gradients with respect to `tau` hold at fixed times, for accelerations as in
-        `Model.jacobian`. Second and forward derivatives are not available.
+        asked for, of the shapes of `Model.rollouts`.
+        The gradient with respect to a unit quaternion q is that of the function of q/|q|,
+        orthogonal to q. Gradients with respect to `tau` hold at fixed times, for accelerations as
+        in `Model.jacobian`, and without those of rotations. Second and forward derivatives
+        are not available.
 
     Raises
     ------
@@ -164,14 +168,15 @@ def jax_rollouts(
 
     def forward(values: dict[str, Any]) -> tuple[Any, ...]:
         dtype = jax.numpy.result_type(float, *values.values())
-        shape = jax.ShapeDtypeStruct((work.rows(values), work.n_samples, model.n_dofs), dtype)
+        columns = (model.n_coordinates, model.n_dofs, model.n_dofs)[: derivatives + 1]
+        shapes = tuple(
+            jax.ShapeDtypeStruct((work.rows(values), work.n_samples, n), dtype) for n in columns
+        )
 
         def call(given: dict[str, Any]) -> tuple[Any, ...]:
             return tuple(array.astype(dtype) for array in work.forward(_as_numpy(given)))
 
-        made: tuple[Any, ...] = jax.pure_callback(
-            call, (shape,) * (derivatives + 1), values, vmap_method="sequential"
-        )
+        made: tuple[Any, ...] = jax.pure_callback(call, shapes, values, vmap_method="sequential")
         return made
 
     def backward(values: dict[str, Any], cotangents: tuple[Any, ...]) -> tuple[dict[str, Any]]:
@@ -213,8 +218,6 @@ class _Rollouts:
         self.options: dict[str, Any] = {"dt": dt, "duration": duration, "threads": threads}
         (positions,) = model.rollouts(conditions, dt=dt, duration=duration, derivatives=0)
         self.n_samples = positions.shape[1]
-        # A model with rotations is refused here, before a network is built on it.
-        model.rollouts_vjp("style", np.zeros_like(positions), conditions, dt=dt, duration=duration)
 
     @staticmethod
     def rows(values: dict[str, Any]) -> int:

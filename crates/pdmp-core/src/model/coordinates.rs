@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 use crate::demonstration::RotationColumns;
 pub(crate) use crate::demonstration::layout;
 use crate::dynamics::mean_rotation::MeanRotation;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kind::Kind;
-use crate::model::conditions::{Conditions, ResolvedConditions};
 use crate::model::primitive::Primitive;
 use crate::numerics::rotation::{
-    Quaternion, Turning, Vector, add_scaled, exp, inverse, inverse_jacobian, jacobian, log_near, on_side_of, product,
-    rotate,
+    Quaternion, Turning, Vector, add_scaled, cross, dot, exp, inverse, inverse_jacobian, jacobian, log_near,
+    on_side_of, product, rotate,
 };
+use crate::numerics::rotation_transpose::{JacobianPath, turn_cotangent};
 use crate::validate::check_vector;
 
 /// Frame in which angular velocities and accelerations are expressed.
@@ -67,7 +67,7 @@ impl Rotation {
     }
 
     #[inline(always)]
-    fn write(&self, vector: Vector, dofs: &mut [f64]) {
+    pub(super) fn write(&self, vector: Vector, dofs: &mut [f64]) {
         dofs[self.dof..self.dof + 3].copy_from_slice(&vector);
     }
 
@@ -85,11 +85,15 @@ impl Rotation {
         mean.times_exp(dofs.map(|dofs| self.read(dofs)))
     }
 
+    /// Returns the velocity exp(δ)ᵀω̄ of the mean rotation in the body frame at clock `u`, per unit of the clock.
+    pub(super) fn carried(&self, u: f64, delta: Vector) -> Vector {
+        rotate(inverse(exp(delta)), self.mean.at(u).velocity)
+    }
+
     /// Returns δ and δ̇ of a motion at clock `u`, for the rate of the mean rotation. δ is that closest to `near`.
     pub(crate) fn residual(&self, u: f64, rate: f64, motion: &Turning, near: Vector) -> [Vector; 2] {
-        let mean = self.mean.at(u);
-        let delta = log_near(product(inverse(mean.rotation), motion.rotation), near);
-        let carried = rotate(inverse(exp(delta)), mean.velocity);
+        let delta = log_near(product(inverse(self.mean.at(u).rotation), motion.rotation), near);
+        let carried = self.carried(u, delta);
         [delta, inverse_jacobian(delta, add_scaled(motion.velocity, -rate, carried))]
     }
 }
@@ -255,6 +259,43 @@ impl Coordinates {
         rotation.write(moved.acceleration, acceleration);
     }
 
+    /// Passes the cotangents of position, velocity and acceleration to those of the motion of the DoFs, of which
+    /// [`Self::motion`] made them. Returns the products of the cotangents of position and velocity with their derivatives by
+    /// time, and of that of the velocity with it.
+    pub(crate) fn pull_back(
+        &self,
+        dofs: [&[f64]; 3],
+        [position, velocity, acceleration]: [&[f64]; 3],
+        [by_position, by_velocity, by_acceleration]: [&[f64]; 3],
+        by_dofs: &mut [Vec<f64>; 3],
+    ) -> [f64; 2] {
+        let (mut slopes, mut velocities) = (0.0, 0.0);
+        for &[column, dof] in &self.plain {
+            let [v, flow, bend] = [by_position[column], by_velocity[dof], by_acceleration[dof]];
+            by_dofs.iter_mut().zip([v, flow, bend]).for_each(|(to, v)| to[dof] = v);
+            slopes += v * velocity[dof] + flow * acceleration[dof];
+            velocities += flow * velocity[dof];
+        }
+        for rotation in &self.rotations {
+            let q = rotation.columns.read(position);
+            let mut turn = turn_cotangent(q, rotation.columns.read(by_position));
+            let mut vectors = [velocity, acceleration, by_velocity, by_acceleration].map(|row| rotation.read(row));
+            if self.frame == Frame::World {
+                vectors = vectors.map(|v| rotate(inverse(q), v));
+            }
+            let [velocity, acceleration, mut flow, bend] = vectors;
+            slopes += dot(turn, velocity) + dot(flow, acceleration);
+            velocities += dot(flow, velocity);
+            if self.frame == Frame::Body {
+                turn = add_scaled(add_scaled(turn, 1.0, cross(flow, velocity)), 1.0, cross(bend, acceleration));
+            }
+            flow = add_scaled(flow, 1.0, cross(bend, velocity));
+            let found = JacobianPath::new(dofs.map(|dofs| rotation.read(dofs))).pull_back([turn, flow, bend]);
+            by_dofs.iter_mut().zip(found).for_each(|(to, v)| rotation.write(v, to));
+        }
+        [slopes, velocities]
+    }
+
     /// Converts velocities to those of the DoFs at `dofs` and clock `u`, J⁻¹(δ)ω, without the motion of the mean rotation.
     pub(crate) fn relative_velocity(&self, u: f64, dofs: &[f64], velocity: &mut [f64]) {
         for rotation in &self.rotations {
@@ -272,8 +313,7 @@ impl Coordinates {
     pub(crate) fn for_each_drift(&self, u: f64, dofs: &[f64], mut visit: impl FnMut(usize, Vector)) {
         for rotation in &self.rotations {
             let delta = rotation.read(dofs);
-            let carried = rotate(inverse(exp(delta)), rotation.mean.at(u).velocity);
-            visit(rotation.dof, inverse_jacobian(delta, carried));
+            visit(rotation.dof, inverse_jacobian(delta, rotation.carried(u, delta)));
         }
     }
 
@@ -307,94 +347,5 @@ impl Coordinates {
         let carried = rotate(inverse(exp(new)), after.velocity);
         let rest: Vector = std::array::from_fn(|i| omega[i] - rate * carried[i]);
         [new, inverse_jacobian(new, rest)]
-    }
-
-    /// Converts conditions to those of the degrees of freedom, their start velocity at a constant τ.
-    ///
-    /// # Errors
-    /// As for [`Self::in_dofs`], or a τ out of range.
-    pub(crate) fn constant_in_dofs(&self, conditions: &Conditions) -> Result<Conditions> {
-        let mut converted = self.in_dofs(conditions)?;
-        let rate = 1.0 / conditions.time_constant(&self.dofs)?;
-        let start = converted.start.as_ref().unwrap_or(&self.dofs.nominal.start);
-        if let Some(velocity) = &mut converted.velocity {
-            self.for_each_drift(0.0, start, |dof, drift| {
-                (0..3).for_each(|i| velocity[dof + i] -= drift[i] * rate);
-            });
-        }
-        Ok(converted)
-    }
-
-    /// Converts conditions to those of the degrees of freedom. A start velocity lacks that of the mean rotations, which
-    /// depends on τ.
-    ///
-    /// # Errors
-    /// A vector of another length, a number that is not finite, or a quaternion whose norm is not 1.
-    pub(crate) fn in_dofs(&self, conditions: &Conditions) -> Result<Conditions> {
-        let nominal = &self.dofs.nominal;
-        let start_clock =
-            conditions.phase.filter(|phase| phase.is_finite()).map_or(0.0, crate::dynamics::canonical::turn);
-        let start_clock = if self.dofs.kind() == Kind::Rhythmic { start_clock } else { 0.0 };
-        let convert = |name, value: &Option<Vec<f64>>, u: f64, near: Option<&[f64]>| match value {
-            Some(value) => self.check(name, value).map(|()| {
-                let mut dofs = vec![0.0; self.dofs.n_dofs()];
-                self.to_dofs(u, value, near, &mut dofs);
-                Some(dofs)
-            }),
-            None => Ok(None),
-        };
-        let start = convert("start", &conditions.start, start_clock, None)?;
-        // The residual rotation changes by the shorter way between start and goal.
-        let near = start.as_deref().or(Some(&nominal.start)).filter(|_| self.dofs.kind() == Kind::Discrete);
-        let centre_clock = self.centre_clock();
-        let goal = convert("goal", &conditions.goal, centre_clock, near)?;
-        let anchor = convert("anchor", &conditions.anchor, centre_clock, None)?;
-        let relative = |name, velocity: &Option<Vec<f64>>, u: f64, dofs: Option<&[f64]>| match (velocity, dofs) {
-            (None, _) => Ok(None),
-            (Some(_), None) => Err(Error::Argument {
-                name,
-                problem: "needs a start: the rotation of a rhythmic movement has no angular velocity without one",
-            }),
-            (Some(velocity), Some(dofs)) => check_vector(name, velocity, dofs.len(), "DoF").map(|()| {
-                let mut velocity = velocity.clone();
-                self.relative_velocity(u, dofs, &mut velocity);
-                Some(velocity)
-            }),
-        };
-        let at_start = start.as_deref().or(near);
-        let velocity = relative("velocity", &conditions.velocity, start_clock, at_start)?;
-        let at_goal = goal.as_deref().or(Some(&nominal.centre));
-        let goal_velocity = relative("goal_velocity", &conditions.goal_velocity, centre_clock, at_goal)?;
-        Ok(Conditions { goal, anchor, start, velocity, goal_velocity, ..conditions.clone() })
-    }
-
-    /// Checks conditions and completes them in degrees of freedom.
-    ///
-    /// # Errors
-    /// As for [`Conditions::complete`], or a quaternion whose norm is not 1.
-    pub(crate) fn complete(&self, conditions: &Conditions) -> Result<ResolvedConditions> {
-        let mut resolved = self.in_dofs(conditions)?.complete(&self.dofs)?;
-        if let (Some(_), Some(start)) = (&resolved.velocity, &resolved.start) {
-            let mut drift = vec![0.0; start.len()];
-            self.for_each_drift(resolved.phase, start, |dof, velocity| {
-                drift[dof..dof + 3].copy_from_slice(&velocity);
-            });
-            resolved.drift = Some(drift);
-        }
-        Ok(resolved)
-    }
-
-    /// Converts conditions of the degrees of freedom to those of the coordinates, without velocities.
-    pub(crate) fn of_dofs(&self, conditions: Conditions) -> Conditions {
-        let position = |u: f64, dofs: Option<Vec<f64>>| {
-            dofs.map(|dofs| {
-                let mut position = vec![0.0; self.n_coordinates()];
-                self.to_position(u, &dofs, &mut position);
-                position
-            })
-        };
-        let Conditions { goal, anchor, start, .. } = conditions.clone();
-        let u = self.centre_clock();
-        Conditions { goal: position(u, goal), anchor: position(u, anchor), start: position(0.0, start), ..conditions }
     }
 }

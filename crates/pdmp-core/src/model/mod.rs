@@ -1,6 +1,7 @@
 //! Models: a learnt primitive with the parameters of its demonstrations, the summary of the fit and the context map.
 
 pub(crate) mod conditions;
+pub(crate) mod coordinate_conditions;
 pub(crate) mod coordinates;
 pub(crate) mod file;
 pub(crate) mod finding;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use ndarray::{Array3, ArrayViewMut3, Axis, aview1, s};
+use ndarray::{ArrayViewMut3, Axis};
 
 use crate::dynamics::additional_forcing::AdditionalForcing;
 use crate::error::{Error, Result};
@@ -12,13 +12,14 @@ use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::model::responses::{Derivative, Responses};
 use crate::motion::batch_conditions::{BatchConditions, PerMovement};
+use crate::motion::batch_poses::Poses;
 use crate::motion::batch_singles::Singles;
 use crate::motion::rollout::TimeGrid;
 use crate::motion::superposition::{self, Combination};
 use crate::motion::trajectory::Trajectories;
 use crate::motion::unit_responses::responses;
 use crate::numerics::threads::Threads;
-use crate::validate::{check_range, row_major, zeros};
+use crate::validate::{check_range, zeros};
 
 /// Number of elements of each output that one thread writes per block.
 pub(super) const BLOCK: usize = 1 << 17;
@@ -69,8 +70,8 @@ pub struct Batch {
     pub(super) dt: f64,
     /// Primitive of the responses, in degrees of freedom.
     pub(super) primitive: Arc<Primitive>,
-    /// Primitive with rotations.
-    pub(super) pose: Option<Arc<Primitive>>,
+    /// Primitive and conditions in coordinates with rotations.
+    pub(super) poses: Option<Poses>,
     /// Movements of different timings, which share no responses; those of the batch are then empty.
     pub(super) singles: Option<Singles>,
     n_samples: usize,
@@ -94,16 +95,16 @@ pub fn batch(
     progress: &mut dyn FnMut(f64) -> Result<()>,
 ) -> Result<Batch> {
     let (outside, primitive) = (primitive, primitive.inside());
-    let coordinates = outside.coordinates();
-    let in_dofs = coordinates.map(|coordinates| conditions.clone().in_dofs(coordinates)).transpose()?;
-    let checked = in_dofs.as_ref().unwrap_or(&conditions);
-    let n_movements = checked.check(primitive)?;
-    let tau = checked.common_tau(primitive, n_movements)?;
+    let (conditions, given) = match outside.coordinates() {
+        Some(coordinates) => (conditions.clone().in_dofs(coordinates)?, Some(conditions)),
+        None => (conditions, None),
+    };
+    let n_movements = conditions.check(primitive)?;
+    let tau = conditions.common_tau(primitive, n_movements)?;
     let singles = match tau {
         Some(_) => None,
-        None => Some(Singles::new(outside, conditions.movements(n_movements), grid)?),
+        None => Some(Singles::new(outside, given.as_ref().unwrap_or(&conditions).movements(n_movements), grid)?),
     };
-    let conditions = in_dofs.unwrap_or(conditions);
     let BatchConditions { style, goal, anchor, start, velocity, goal_velocity, amplitude, forcing, .. } = conditions;
     let nominal = Conditions { tau, ..Conditions::default() }.complete(primitive)?;
     let n_samples = match &singles {
@@ -134,7 +135,7 @@ pub fn batch(
         amplitudes: amplitude.unwrap_or(PerMovement::All(vec![nominal.amplitude])),
         tau: nominal.tau,
         dt: grid.dt,
-        pose: outside.coordinates().is_some().then(|| Arc::clone(outside)),
+        poses: given.map(|conditions| Poses { primitive: Arc::clone(outside), conditions }),
     })
 }
 
@@ -147,6 +148,11 @@ impl Batch {
     /// Returns the number of style parameters.
     pub(super) fn n_styles(&self) -> usize {
         self.styles.row(0).len()
+    }
+
+    /// Returns τ of movement `b`, in seconds.
+    pub(super) fn tau_of(&self, b: usize) -> f64 {
+        self.singles.as_ref().map_or(self.tau, |singles| singles.tau(b))
     }
 
     /// Returns the number of columns of positions, or of a derivative: coordinates or DoFs.
@@ -165,8 +171,8 @@ impl Batch {
     /// # }
     /// ```
     pub fn n_columns(&self, derivative: Derivative) -> usize {
-        match &self.pose {
-            Some(primitive) if derivative == Derivative::Position => primitive.n_coordinates(),
+        match &self.poses {
+            Some(poses) if derivative == Derivative::Position => poses.primitive.n_coordinates(),
             _ => self.shape().2,
         }
     }
@@ -272,47 +278,22 @@ impl Batch {
             progress((first - movements.start) as f64 / movements.len() as f64)?;
             threads.try_for_each(next, |(first, mut outputs)| match &self.singles {
                 Some(singles) => singles.write(first, &mut outputs),
-                None => {
-                    self.write_block(first, outputs);
-                    Ok(())
-                }
+                None => self.write_block(first, outputs),
             })?;
         }
     }
 
     /// Writes one block, the movements from `first` on.
-    fn write_block(&self, first: usize, outputs: Vec<ArrayViewMut3<f64>>) {
+    fn write_block(&self, first: usize, outputs: Vec<ArrayViewMut3<f64>>) -> Result<()> {
+        if let Some(poses) = &self.poses {
+            return self.write_poses(poses, first, outputs);
+        }
         let n = outputs.first().map_or(0, |output| output.len_of(Axis(0)));
         let combinations: Vec<Combination> = (first..first + n).map(|b| self.combination(b)).collect();
-        if let Some(pose) = &self.pose {
-            return self.write_poses(pose, &combinations, outputs);
-        }
         for (derivative, output) in Derivative::ALL.into_iter().zip(outputs) {
             superposition::write(&combinations, self.responses.of(derivative), derivative, output);
         }
-    }
-
-    /// Writes the movements of consecutive combinations in coordinates.
-    fn write_poses(&self, primitive: &Primitive, combinations: &[Combination], mut outputs: Vec<ArrayViewMut3<f64>>) {
-        let Some(coordinates) = primitive.coordinates() else { return };
-        let ((_, n_samples, n_dofs), rate) = (self.shape(), 1.0 / self.tau);
-        let mut dofs = [(); 3].map(|()| Array3::zeros((1, n_samples, n_dofs)));
-        let mut moved = [vec![0.0; coordinates.n_coordinates()], vec![0.0; n_dofs], vec![0.0; n_dofs]];
-        for (b, combination) in combinations.iter().enumerate() {
-            for (derivative, dofs) in Derivative::ALL.into_iter().zip(&mut dofs).take(outputs.len()) {
-                let curves = self.responses.of(derivative);
-                superposition::write(std::slice::from_ref(combination), curves, derivative, dofs.view_mut());
-            }
-            moved[0].fill(0.0);
-            for k in 0..n_samples {
-                let rows = dofs.each_ref().map(|dofs| &row_major(dofs)[k * n_dofs..][..n_dofs]);
-                let [position, velocity, acceleration] = &mut moved;
-                coordinates.motion(k as f64 * self.dt * rate, [rate, 0.0], rows, position, velocity, acceleration);
-                for (output, moved) in outputs.iter_mut().zip(&moved) {
-                    output.slice_mut(s![b, k, ..]).assign(&aview1(moved));
-                }
-            }
-        }
+        Ok(())
     }
 
     /// Returns the coefficients of movement `b`.

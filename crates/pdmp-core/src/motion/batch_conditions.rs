@@ -297,18 +297,22 @@ impl BatchConditions {
 
     /// Returns the conditions of `n` movements.
     pub(super) fn movements(&self, n: usize) -> Vec<Conditions> {
-        let vector = |rows: &Option<PerMovement>, b: usize| rows.as_ref().map(|rows| rows.row(b).to_vec());
-        let of = |b: usize| Conditions {
-            style: vector(&self.style, b),
-            goal: vector(&self.goal, b),
-            anchor: vector(&self.anchor, b),
-            start: vector(&self.start, b),
-            velocity: vector(&self.velocity, b),
-            goal_velocity: vector(&self.goal_velocity, b),
+        (0..n).map(|b| self.movement(b)).collect()
+    }
+
+    /// Returns the conditions of movement `b`.
+    pub(super) fn movement(&self, b: usize) -> Conditions {
+        let vector = |rows: &Option<PerMovement>| rows.as_ref().map(|rows| rows.row(b).to_vec());
+        Conditions {
+            style: vector(&self.style),
+            goal: vector(&self.goal),
+            anchor: vector(&self.anchor),
+            start: vector(&self.start),
+            velocity: vector(&self.velocity),
+            goal_velocity: vector(&self.goal_velocity),
             forcing: self.forcing.clone(),
             ..self.timing(b)
-        };
-        (0..n).map(of).collect()
+        }
     }
 
     /// Returns the τ of all `n` movements, which then have response curves in common: linear time from phase 0.

@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
-use ndarray::{ArrayView2, ArrayView3, ArrayViewMut3, Axis};
+use ndarray::{Array2, ArrayView2, ArrayView3, ArrayViewMut3, Axis};
 
+use crate::dynamics::canonical::turn;
 use crate::error::Result;
+use crate::model::Coordinates;
 use crate::model::conditions::Conditions;
 use crate::model::primitive::Primitive;
 use crate::motion::controller::third_derivative::third_derivative;
 use crate::motion::response_products::Product;
-use crate::motion::rollout::{TimeGrid, rollout};
+use crate::motion::rollout::{Clock, TimeGrid, rollout};
 use crate::motion::transposed_rollout;
 use crate::validate::row_major;
 
@@ -53,6 +55,34 @@ impl Singles {
             }
         }
         Ok(())
+    }
+
+    /// Writes the motion of the DoFs of movement `b` up to an order, for a primitive with rotations.
+    pub(super) fn write_dofs(&self, coordinates: &Coordinates, b: usize, dofs: &mut [Array2<f64>]) -> Result<()> {
+        let [_, rate, _] = self.clock(b, 1)?[0];
+        let conditions = coordinates.in_dofs_from(&self.conditions[b], rate)?;
+        let movement = rollout(coordinates.dofs(), &conditions, self.grid)?;
+        dofs.iter_mut()
+            .zip([movement.position, movement.velocity, movement.acceleration])
+            .for_each(|(to, from)| *to = from);
+        Ok(())
+    }
+
+    /// Returns the clock u of movement `b` with u̇ and ü at the first `n` samples.
+    pub(super) fn clock(&self, b: usize, n: usize) -> Result<Vec<[f64; 3]>> {
+        let mut clock = Clock::of(&self.primitive, &self.conditions[b])?;
+        let conditions = clock.conditions(&self.conditions[b]);
+        let rate = 1.0 / conditions.time_constant(&self.primitive)?;
+        let (start, mut seconds) = (conditions.phase.map_or(0.0, turn), 0.0);
+        let at = |k: usize| {
+            if k > 0 {
+                let time = k as f64 * self.grid.dt;
+                seconds = clock.tick(time).map_or(time, |tick| seconds + tick);
+            }
+            let [speed, change] = clock.speed();
+            [start + rate * seconds, rate * speed, rate * change]
+        };
+        Ok((0..n).map(at).collect())
     }
 
     /// Returns τ of movement `b`, in seconds.

@@ -3,6 +3,7 @@
 pub(crate) mod angular;
 pub(crate) mod batch;
 pub(crate) mod batch_conditions;
+mod batch_poses;
 mod batch_singles;
 pub(crate) mod command;
 mod commands;

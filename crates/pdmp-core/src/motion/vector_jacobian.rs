@@ -39,6 +39,11 @@ impl Batch {
     /// condition that all movements share has the sum of the rows as its gradient. The gradients equal
     /// Σ v·∂y/∂v with the Jacobians of [`crate::motion::jacobian`], to rounding.
     ///
+    /// In a model with rotations, cotangents of positions and gradients by goals, anchors and starts have a column for each
+    /// coordinate. The gradient by a unit quaternion q is that of L as a function of q/|q|, orthogonal to q; of cotangents of a
+    /// quaternion the part along it has no effect. Cotangents and gradients of velocities are those of angular velocities, in
+    /// the frame of the model.
+    ///
     /// `progress` is called periodically with the completed fraction; an error it returns cancels the call.
     ///
     /// ```
@@ -66,7 +71,7 @@ impl Batch {
     ///
     /// # Errors
     /// A range beyond the batch; cotangents of another number or shape, or that are not finite; a variable of the other
-    /// kind of primitive, or a velocity or start that the batch does not have; τ with segment durations; a primitive with
+    /// kind of primitive, or a velocity or start that the batch does not have; τ with segment durations, or with accelerations of
     /// rotations; or the error of `progress`.
     pub fn vector_jacobian(
         &self,
@@ -81,7 +86,8 @@ impl Batch {
         let columns = |variable: &WithRespectTo| match variable {
             WithRespectTo::Style => self.n_styles(),
             WithRespectTo::Amplitude | WithRespectTo::Tau => 1,
-            _ => n_dofs,
+            WithRespectTo::Velocity | WithRespectTo::GoalVelocity => n_dofs,
+            _ => self.n_columns(Derivative::Position),
         };
         let new = |variable| zeros("gradients", (movements.len(), columns(variable)));
         let mut gradients = variables.iter().map(new).collect::<Result<Vec<_>>>()?;
@@ -90,6 +96,8 @@ impl Batch {
             true => (0..n_samples).flat_map(|k| std::iter::repeat_n(k as f64 * self.dt, n_dofs)).collect(),
             false => Vec::new(),
         };
+        // With rotations, the products of a change of τ are those in coordinates.
+        let by_tau = by_tau && self.poses.is_none();
         let by_accelerations = by_tau && cotangents.len() > 2 && self.singles.is_none();
         let third = by_accelerations
             .then(|| third_derivatives(&self.primitive, &self.responses, self.tau, self.forcing.as_ref(), self.dt));
@@ -107,10 +115,7 @@ impl Batch {
             threads.try_for_each(next, |(first, mut outputs)| {
                 let at = first..(first + in_block).min(movements.len());
                 let cotangents: Vec<_> = cotangents.iter().map(|array| array.slice(s![at.clone(), .., ..])).collect();
-                let products = match &self.singles {
-                    Some(singles) => singles.products(movements.start + first, &cotangents, by_tau)?,
-                    None => work.block(movements.start + first, &cotangents),
-                };
+                let products = work.products(movements.start + first, &cotangents, by_tau)?;
                 for (i, product) in products.iter().enumerate() {
                     for (variable, output) in variables.iter().zip(&mut outputs) {
                         self.write_gradient(movements.start + first + i, *variable, product, output.row_mut(i))?;
@@ -131,20 +136,21 @@ impl Batch {
         variables: &[WithRespectTo],
         cotangents: &[ArrayView3<f64>],
     ) -> Result<()> {
-        let (n_movements, n_samples, n_dofs) = self.shape();
+        let (n_movements, n_samples, _) = self.shape();
         let wrong = |name, problem| Err(Error::Argument { name, problem });
-        if self.pose.is_some() {
-            return wrong("cotangents", "do not apply to a model with rotations: pass its Jacobians to your framework");
-        }
         if movements.end > n_movements {
             let value = movements.end as f64;
             return Err(Error::Range { name: "movements", value, allowed: "exceeds the number of movements" });
         }
-        let expected = (movements.len(), n_samples, n_dofs);
-        if !(1..=3).contains(&cotangents.len()) || cotangents.iter().any(|array| array.dim() != expected) {
-            return wrong("cotangents", "must be one to three arrays, each (movements, samples, DoFs) of the batch");
+        let mut orders = Derivative::ALL.map(|order| (movements.len(), n_samples, self.n_columns(order))).into_iter();
+        if cotangents.is_empty() || cotangents.iter().any(|array| Some(array.dim()) != orders.next()) {
+            return wrong(
+                "cotangents",
+                "must be one to three arrays (movements, samples, DoFs) of the batch, that of positions with its coordinates",
+            );
         }
         for variable in variables {
+            self.poses.as_ref().map_or(Ok(()), |poses| poses.check(*variable, cotangents.len()))?;
             variable.check(self.kind)?;
             if *variable == WithRespectTo::Tau && self.singles.as_ref().is_some_and(Singles::is_warped) {
                 return wrong(
@@ -192,24 +198,24 @@ impl Batch {
         let dot = |rows: &Option<PerMovement>, products: &[f64]| {
             rows.as_ref().map_or(0.0, |rows| rows.row(b).iter().zip(products).fold(0.0, |sum, (v, p)| sum + v * p))
         };
-        match variable {
-            WithRespectTo::Style => {
+        match (variable, &self.poses) {
+            (WithRespectTo::Style, _) => {
                 gradient.indexed_iter_mut().for_each(|(j, to)| *to = self.amplitudes.row(b)[0] * unit_style(j))
             }
-            WithRespectTo::Amplitude => {
+            (WithRespectTo::Amplitude, _) => {
                 gradient[0] = self.styles.row(b).indexed_iter().fold(0.0, |sum, (j, s)| sum + s * unit_style(j));
             }
-            WithRespectTo::Goal | WithRespectTo::Anchor if self.starts.is_some() => {
+            (_, Some(poses)) => self.write_pose_gradient(poses, b, variable, product, gradient.view_mut())?,
+            (WithRespectTo::Goal | WithRespectTo::Anchor, _) if self.starts.is_some() => {
                 gradient.indexed_iter_mut().for_each(|(d, to)| *to = centre[d] - start[d]);
             }
-            WithRespectTo::Goal | WithRespectTo::Anchor => gradient.assign(&aview1(centre)),
-            WithRespectTo::Start => gradient.assign(&aview1(start)),
-            WithRespectTo::Velocity => gradient.assign(&aview1(velocity)),
-            WithRespectTo::GoalVelocity => gradient.assign(&aview1(goal_velocity)),
-            WithRespectTo::Tau => {
+            (WithRespectTo::Goal | WithRespectTo::Anchor, _) => gradient.assign(&aview1(centre)),
+            (WithRespectTo::Start, _) => gradient.assign(&aview1(start)),
+            (WithRespectTo::Velocity, _) => gradient.assign(&aview1(velocity)),
+            (WithRespectTo::GoalVelocity, _) => gradient.assign(&aview1(goal_velocity)),
+            (WithRespectTo::Tau, _) => {
                 let given = dot(&self.velocities, velocity) + dot(&self.goal_velocities, goal_velocity);
-                let tau = self.singles.as_ref().map_or(self.tau, |singles| singles.tau(b));
-                gradient[0] = (given - product.scaled_time) / tau;
+                gradient[0] = (given - product.scaled_time) / self.tau_of(b);
             }
         }
         if gradient.iter().all(|value| value.is_finite()) {
@@ -231,6 +237,19 @@ struct Contraction<'a> {
 }
 
 impl Contraction<'_> {
+    /// Returns the products of consecutive movements from `first` on with their cotangents, in DoFs.
+    fn products(&self, first: usize, cotangents: &[ArrayView3<f64>], by_tau: bool) -> Result<Vec<Product>> {
+        let of_dofs = |cotangents: &[ArrayView3<f64>]| match &self.batch.singles {
+            Some(singles) => singles.products(first, cotangents, self.by_tau),
+            None => Ok(self.block(first, cotangents)),
+        };
+        let Some(poses) = &self.batch.poses else { return of_dofs(cotangents) };
+        let found = self.batch.pull_back(poses, first, cotangents, by_tau)?;
+        let mut products = of_dofs(&found.orders.iter().map(|array| array.view()).collect::<Vec<_>>())?;
+        products.iter_mut().zip(found.scaled_times).for_each(|(product, sum)| product.scaled_time = sum);
+        Ok(products)
+    }
+
     /// Returns the products of consecutive movements from `first` on with their cotangents.
     fn block(&self, first: usize, cotangents: &[ArrayView3<f64>]) -> Vec<Product> {
         let batch = self.batch;

@@ -8,6 +8,7 @@ pub(crate) mod matern;
 pub(crate) mod orthonormal_span;
 pub(crate) mod pool;
 pub(crate) mod rotation;
+pub(crate) mod rotation_transpose;
 #[cfg(test)]
 pub(crate) mod runge_kutta;
 pub(crate) mod simd;

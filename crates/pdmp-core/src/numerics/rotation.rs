@@ -38,7 +38,7 @@ const MEAN_CONVERGED: f64 = 1e-15;
 /// Largest angle for the inverse Jacobian, which is at most 3.4 there, and singular at 2π.
 const MAX_INVERTIBLE: f64 = 1.5 * PI;
 
-/// Coefficients of the power series in θ² of cos(θ/2) and sin(θ/2)/θ, and of c₁, c₂, c₁′/θ and c₂′/θ.
+/// Coefficients of the power series in θ² of cos(θ/2), sin(θ/2)/θ, (c₁′/θ)′/θ and (c₂′/θ)′/θ, and of c₁, c₂, c₁′/θ and c₂′/θ.
 struct Series {
     half: [F64x4; N_TERMS],
     jacobian: [F64x4; N_TERMS],
@@ -56,7 +56,11 @@ impl Series {
             let n = 2.0 * k as f64;
             let odd = factorial / (n + 1.0);
             let (first, second) = (odd / (n + 2.0), odd / ((n + 2.0) * (n + 3.0)));
-            half[k] = [sign * quarter * factorial, 0.5 * sign * quarter * odd, 0.0, 0.0];
+            // As the slopes below, from the terms after the next.
+            let bend = (n + 2.0) / ((n + 3.0) * (n + 5.0) * (n + 6.0));
+            let curl = (n + 2.0) / ((n + 5.0) * (n + 6.0) * (n + 7.0));
+            let cosine = sign * quarter * factorial;
+            half[k] = [cosine, 0.5 * sign * quarter * odd, sign * first * bend, sign * second * curl];
             // The derivative of (−1)ᵏθ²ᵏ/(2k + 2)! divided by θ is the next term's (−1)ᵏ⁺¹(2k + 2)θ²ᵏ/(2k + 4)!.
             let slope = -(n + 2.0) / ((n + 3.0) * (n + 4.0));
             let twist = -(n + 2.0) / ((n + 4.0) * (n + 5.0));
@@ -102,7 +106,7 @@ fn half_angle(square: f64) -> [f64; 2] {
 
 /// Returns c₁, c₂, c₁′/θ and c₂′/θ.
 #[inline(always)]
-fn jacobian_coefficients(square: f64) -> [f64; 4] {
+pub(super) fn jacobian_coefficients(square: f64) -> [f64; 4] {
     if square <= MAX_SERIES_SQUARE {
         return sum(&SERIES.jacobian, square);
     }
@@ -112,6 +116,19 @@ fn jacobian_coefficients(square: f64) -> [f64; 4] {
     let slope = (angle * sine - 2.0 * (1.0 - cosine)) / (square * square);
     let twist = (3.0 * sine - angle * cosine - 2.0 * angle) / (square * square * angle);
     [first, second, slope, twist]
+}
+
+/// Returns (c₁′/θ)′/θ and (c₂′/θ)′/θ.
+#[inline(always)]
+pub(super) fn jacobian_bends(square: f64, [first, second, slope, twist]: [f64; 4]) -> [f64; 2] {
+    if square <= MAX_SERIES_SQUARE {
+        let [_, _, bend, curl] = sum(&SERIES.half, square);
+        return [bend, curl];
+    }
+    // sin θ/θ = 1 − c₂θ², and its derivative divided by θ is c₂ − c₁.
+    let change = second - first;
+    let sine = 1.0 - second * square;
+    [(change - 4.0 * slope) / square, ((sine + 3.0 * change) / square - 4.0 * twist) / square]
 }
 
 /// Returns a×b.
@@ -236,12 +253,19 @@ pub(crate) fn jacobian(delta: Vector, v: Vector) -> Vector {
 }
 
 /// Returns J⁻¹(δ)v. For angles beyond 3π/2 it is that of 3π/2, which keeps velocities bounded.
-pub(crate) fn inverse_jacobian(mut delta: Vector, v: Vector) -> Vector {
-    let mut square = dot(delta, delta);
-    if square > MAX_INVERTIBLE * MAX_INVERTIBLE {
-        let shrinkage = MAX_INVERTIBLE / square.sqrt();
-        (delta, square) = (delta.map(|x| x * shrinkage), MAX_INVERTIBLE * MAX_INVERTIBLE);
-    }
+pub(crate) fn inverse_jacobian(delta: Vector, v: Vector) -> Vector {
+    unbounded_inverse_jacobian(delta.map(|x| x * shrinkage(delta)), v)
+}
+
+/// Returns the factor of δ that limits its angle to 3π/2.
+pub(super) fn shrinkage(delta: Vector) -> f64 {
+    let square = dot(delta, delta);
+    if square > MAX_INVERTIBLE * MAX_INVERTIBLE { MAX_INVERTIBLE / square.sqrt() } else { 1.0 }
+}
+
+/// Returns J⁻¹(δ)v, which grows without bounds towards whole turns.
+pub(super) fn unbounded_inverse_jacobian(delta: Vector, v: Vector) -> Vector {
+    let square = dot(delta, delta);
     let [cosine, sine] = half_angle(square);
     // The difference loses at most three digits of a term that is θ²/12 of the others.
     let third = if square < 1e-4 { 1.0 / 12.0 + square / 720.0 } else { (1.0 - 0.5 * cosine / sine) / square };
@@ -433,5 +457,7 @@ mod tests {
         for (a, b) in jacobian_coefficients(below).into_iter().zip(jacobian_coefficients(above)) {
             assert!(relative(a, b) < 4e-15, "{a} {b}");
         }
+        let [a, b] = [below, above].map(|square| jacobian_bends(square, jacobian_coefficients(square)));
+        assert!(relative(a[0], b[0]) < 1e-14 && relative(a[1], b[1]) < 1e-14, "{a:?} {b:?}");
     }
 }
