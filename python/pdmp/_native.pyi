@@ -662,7 +662,8 @@ def fill_gaps(
     Raises
     ------
     ValueError
-        A gap is longer than `max_gap`, or lies at an end.
+        A gap is longer than `max_gap`, or lies at an end; or time stamps are further apart than a
+        positive `max_gap` and than five usual intervals.
     """
 
 def cycles(
