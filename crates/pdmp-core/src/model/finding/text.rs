@@ -95,7 +95,9 @@ impl fmt::Display for Finding {
                         "interpolation over equally long parts errs by up to {:.0} % of the range of {dof:?}",
                         100.0 * share
                     )?,
-                    None => f.write_str("the rest of the recording is too short to tell the movement in between")?,
+                    None => {
+                        f.write_str("the rest of the recording is too short to determine the movement in between")?
+                    }
                 }
                 f.write_str(
                     ": missing rows? Leave the demonstration out, or cut the recording there with \

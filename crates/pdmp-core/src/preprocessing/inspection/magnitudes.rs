@@ -13,10 +13,9 @@ const MIN_RATIO: f64 = 15.0;
 /// range of columns with unusual steps, or with other findings, is not that of the movement.
 pub(super) fn magnitudes_of(demo: usize, survey: &Survey, known: &[Finding], unusual: &[usize]) -> Vec<f64> {
     let is_wrong = |d: usize| {
-        let name = survey.name(d);
         let is_about = |finding: &Finding| match finding {
-            Finding::Zeros { demo: own, dofs, .. } => *own == demo && dofs.contains(&name),
-            Finding::Wrap { demo: own, dof, .. } => *own == demo && *dof == name,
+            Finding::Zeros { demo: own, dofs, .. } => *own == demo && dofs.contains(&survey.name(d)),
+            Finding::Wrap { demo: own, dof, .. } => *own == demo && *dof == survey.name(d),
             Finding::Padded { demo: own, .. } => *own == demo,
             _ => false,
         };
@@ -56,7 +55,9 @@ pub(crate) fn apart(magnitudes: &[Vec<f64>], units: &[String]) -> Vec<Finding> {
             // Of two columns both must be apart.
             let (low, high) = (lower_median(ratios()), -lower_median(ratios().map(|ratio| -ratio)));
             let ratio = if low >= 1.0 { low } else { high };
-            if ratio > 0.0 && is_apart(ratio) {
+            // A single degree of freedom may hardly move in some demonstrations.
+            let is_rest = ratio < 1.0 && columns.len() == 1;
+            if ratio > 0.0 && is_apart(ratio) && !is_rest {
                 let unit = if different.len() > 1 { (*unit).clone() } else { String::new() };
                 findings.push(Finding::OtherRange { demo, ratio, unit });
             }

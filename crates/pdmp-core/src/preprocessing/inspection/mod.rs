@@ -45,6 +45,9 @@ const MIN_SAMPLES: usize = 10;
 /// angle of a joint that is not tracked, has errors of 3e-16 in recorded BVH files; products of many rotations have more.
 const ROUNDING: f64 = 1e-12;
 
+/// Approximate number of values that are processed together.
+const LANES: usize = 64;
+
 /// Returns the implausible samples of demonstrations of one skill.
 ///
 /// `dt` is the sampling interval in seconds of demonstrations without times; locations lack the time if it is `None`.
@@ -121,19 +124,28 @@ impl<'a> Survey<'a> {
         let position = demo.position();
         let position = position.as_standard_layout();
         let values = row_major(&position);
-        let (mut low, mut high, mut steps) =
-            (values[..n_dofs].to_vec(), values[..n_dofs].to_vec(), vec![0.0f64; n_dofs]);
-        let mut zero = values[..n_dofs].contains(&0.0);
-        for (before, row) in values.chunks_exact(n_dofs).zip(values[n_dofs..].chunks_exact(n_dofs)) {
+        // Many rows at a time, for vector registers.
+        let length = n_dofs * (LANES / n_dofs).max(1);
+        let first = || values[..n_dofs].iter().copied().cycle().take(length);
+        let (mut low, mut high, mut steps): (Vec<f64>, Vec<f64>, _) =
+            (first().collect(), first().collect(), vec![0.0f64; length]);
+        for (rows, before) in values[n_dofs..].chunks(length).zip(values.chunks(length)) {
             let extremes = low.iter_mut().zip(&mut high).zip(&mut steps);
-            for (((low, high), largest), (y, before)) in extremes.zip(row.iter().zip(before)) {
+            for (((low, high), largest), (y, before)) in extremes.zip(rows.iter().zip(before)) {
                 let step = (y - before).abs();
                 *largest = if step > *largest { step } else { *largest };
                 *low = if *y < *low { *y } else { *low };
                 *high = if *y > *high { *y } else { *high };
-                zero |= *y == 0.0;
             }
         }
+        let of_columns = |all: &[f64], better: fn(f64, f64) -> f64| -> Vec<f64> {
+            (0..n_dofs).map(|d| all[d..].iter().step_by(n_dofs).copied().reduce(better).unwrap_or(0.0)).collect()
+        };
+        let (low, high) = (of_columns(&low, f64::min), of_columns(&high, f64::max));
+        let steps = of_columns(&steps, f64::max);
+        let may_be_zero = low.iter().zip(&high).any(|(low, high)| *low <= 0.0 && *high >= 0.0);
+        let has_zero = |part: &[f64]| part.iter().fold(false, |zero, y| zero | (*y == 0.0));
+        let zero = may_be_zero && values.chunks(LANES).any(has_zero);
         let size = low.iter().chain(&high).fold(0.0f64, |most, y| most.max(y.abs()));
         let ranges = low.iter().zip(&high).map(|(low, high)| high - low).collect();
         Self { demo, dt, n_dofs, ranges, steps, size, zero }
