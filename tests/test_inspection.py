@@ -1,5 +1,6 @@
 """Implausible samples cause warnings of a fit, a style and an evaluation."""
 
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -151,3 +152,110 @@ def test_closed_cycles_are_not_reported() -> None:
         with warnings.catch_warnings():
             warnings.filterwarnings("error", message=".*cycle")
             pdmp.fit([cycle], dt=0.01, kind="rhythmic", n_styles=1)
+
+
+NAMES = {"names": ["j1", "j2"], "units": ["rad", "rad"]}
+
+
+def recorded(
+    change: Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+) -> list[Demonstration]:
+    """Returns noisy reaches of angles, each changed by its number, times and positions."""
+    rng = np.random.default_rng(3)
+    time = np.arange(101) * 0.01
+    demos = []
+    for k, height in enumerate(HEIGHTS):
+        stamps, position = change(k, time, reach(height) + 0.003 * rng.normal(size=(101, 2)))
+        demos.append(Demonstration(position, time=stamps, **NAMES))
+    return demos
+
+
+def of_one(
+    change: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+) -> list[Demonstration]:
+    """Returns noisy reaches the fourth of which is changed."""
+    return recorded(lambda k, t, y: change(t, y) if k == 3 else (t, y))
+
+
+def added(
+    rows: slice, size: float
+) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Returns a change of the second joint in some rows."""
+
+    def change(time: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        position[rows, 1] += size
+        return time, position
+
+    return change
+
+
+def held(time: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a recording whose first joint repeats its value."""
+    position[40:60, 0] = position[40, 0]
+    return time, position
+
+
+def without(time: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a recording without its middle half."""
+    kept = np.r_[0:25, 75:101]
+    return time[kept], position[kept]
+
+
+WRONG = {
+    "outlier": (
+        added(slice(60, 61), 1.0),
+        r'demo 3: "j2" departs by .* at sample 60 \(t = 0.6 s\) and returns, in steps \d+ times '
+        r".*: outliers\? .*NaN",
+    ),
+    "jump": (
+        added(slice(60, None), 0.5),
+        r'demo 3: "j2" jumps by 0.\d+ at sample 60 \(t = 0.6 s\), \d+ times .*split_at',
+    ),
+    "far": (added(slice(60, None), 30.0), r'demo 3: "j2" jumps by .* a slipped sensor'),
+    "stuck": (
+        held,
+        r'demo 3: "j1" is constant from sample 40 .* to sample 59 .* then jumps by .*: '
+        r"a stuck sensor\?",
+    ),
+    "degrees": (
+        lambda t, y: (t, np.degrees(y)),
+        r"demo 3: range [\d.]+ times that of the others: degrees among radians\?",
+    ),
+    "ms": (
+        lambda t, y: (1000 * t, y),
+        r"demo 3: duration of 1000 s, 1000 times the median: ms among s\?",
+    ),
+    "rows": (
+        without,
+        r"demo 3: no samples between sample 24 \(t = 0.24 s\) and sample 25 \(t = 0.75 s\), "
+        r"for 51 times",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+@pytest.mark.parametrize("blocks", [False, True])
+def test_wrong_samples_units_and_stamps_are_reported_once(kind: str, blocks: bool) -> None:
+    """A fault of one demonstration causes a warning of its place, in a fit of blocks too."""
+    change, text = WRONG[kind]
+    demos = of_one(change)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        pdmp.fit([demos[:2], demos[2:]] if blocks else demos)
+    found = [str(warning.message) for warning in caught if str(warning.message).startswith("demo")]
+    assert len(found) == 1
+    assert re.match(text, found[0]), found[0]
+
+
+def test_missing_rows_are_an_error_beyond_max_gap(tmp_path: Path) -> None:
+    """A positive `max_gap` applies to time stamps too; intervals of the usual length are no gap."""
+    path = tmp_path / "rows.csv"
+    rows = [f"{0.01 * k:.2f},{y}" for k, y in enumerate(RISE) if not 40 <= k < 60]
+    path.write_text("\n".join(["t,q", *rows]))
+    with pytest.raises(
+        ValueError, match=r"no row between t = 0.39 s and t = 0.6 s.*max_gap = 0.05 s"
+    ):
+        pdmp.io.read_csv(path, max_gap=0.05)
+    assert pdmp.io.read_csv(path).n_samples == pdmp.io.read_csv(path, max_gap=0.22).n_samples == 81
+    path.write_text("\n".join(["t,q", *rows[:40]]))
+    assert pdmp.io.read_csv(path, max_gap=0.001).n_samples == 40

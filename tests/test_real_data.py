@@ -1,6 +1,7 @@
 """Recordings of people are read, learnt, reproduced, and predicted from contexts."""
 
 import csv
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 import pdmp
 from pdmp import Demonstration
+from pdmp._native import inspected
 from pdmp.io import read_folder
 
 
@@ -118,6 +120,30 @@ def test_running_strides_are_reproduced() -> None:
     model = pdmp.fit(demos, kind="rhythmic", n_styles=len(demos))
     assert worst_error(model, demos) <= 5e-3
     assert_finite(model.rollout(style=model.styles.mean(axis=0), duration=5.0))
+
+
+SETS = [each for each in pdmp.datasets.REGISTRY if each != "kuka_paths"]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_recordings_have_no_unusual_steps_or_units(name: str) -> None:
+    """No recording has an outlier, a jump, a stuck sensor or another unit, at three rates."""
+    demos = recordings(name, 1)
+    for step in (1, 2, 4):
+        fewer = [
+            Demonstration(demo.position[::step], time=demo.time[::step])
+            for demo in demos
+            if demo.n_samples > 4 * step
+        ]
+        unusual = "departs|slipped|stuck|no samples|of the others|the median:"
+        assert [text for text in inspected(fewer)[1] if re.search(unusual, text)] == []
+
+
+def test_jumps_within_smoothed_paths_are_found() -> None:
+    """Paths whose stamps hide missing samples, by 9 to 60 steps, have a jump each."""
+    _, findings = inspected(recordings("kuka_paths", 1))
+    assert len(findings) == 23
+    assert all("slipped sensor, or missing samples?" in text for text in findings)
 
 
 def strides() -> dict[str, list[float]]:

@@ -63,7 +63,13 @@ fn nothing_is_found_in_movements_clean_noisy_or_at_rest() {
     });
     let through: Vec<_> = through.collect();
     let found = inspect(&demos(through), None);
-    assert!(found.iter().all(|finding| !matches!(finding, Finding::Zeros { .. })), "{found:?}");
+    let unexpected = |finding: &Finding| {
+        matches!(
+            finding,
+            Finding::Zeros { .. } | Finding::Outlier { .. } | Finding::Jump { .. } | Finding::Stuck { .. }
+        )
+    };
+    assert!(!found.iter().any(unexpected), "{found:?}");
 }
 
 #[test]
@@ -256,4 +262,213 @@ fn gains_whose_transients_the_samples_do_not_resolve_are_found() {
         let [Finding::Stiff { shown, reproduced, .. }] = &findings[..] else { panic!("{findings:?}") };
         assert!((5.0..15.0).contains(shown) && *reproduced > 3.0 * shown);
     }
+}
+
+/// Movements of different amplitude at 100 Hz with noise of a given size, away from zero.
+fn noisy(noise_size: f64) -> Vec<Array2<f64>> {
+    let movement = |(m, y): (usize, Array2<f64>)| {
+        let mut added = noise(m);
+        Array2::from_shape_fn((201, 2), |(c, d)| {
+            let s = c as f64 / 2.0;
+            let (before, share) = (s.floor() as usize, s.fract());
+            let curve = (1.0 - share) * y[[before, d]] + share * y[[(before + 1).min(100), d]];
+            curve + noise_size * added.next().unwrap()
+        })
+    };
+    reaches().into_iter().enumerate().map(movement).collect()
+}
+
+#[test]
+fn outliers_jumps_and_stuck_sensors_are_found_with_their_place() {
+    for (noise, size) in [(0.0, 0.3), (0.005, 0.3), (0.005, -3.0), (0.005, 30.0)] {
+        for length in [1, 2, 5] {
+            let mut positions = noisy(noise);
+            positions[3].slice_mut(s![60..60 + length, 1]).map_inplace(|y| *y += size);
+            let found = inspect(&demos(positions), None);
+            let [Finding::Outlier { demo: 3, dof, from, to, step, ratio, others: 0 }] = &found[..] else {
+                panic!("{found:?}")
+            };
+            assert_eq!((dof.as_str(), from.sample, to.sample, from.time), ("y1", 60, 59 + length, Some(0.6)));
+            assert!((step - size).abs() < 0.03 && *ratio > 8.0);
+        }
+        let mut positions = noisy(noise);
+        positions[3].slice_mut(s![60.., 1]).map_inplace(|y| *y += size);
+        let found = inspect(&demos(positions), None);
+        assert!(
+            matches!(&found[..], [Finding::Jump { demo: 3, dof, place, others: 0, .. }] if dof == "y1" && place.sample == 60),
+            "{found:?}"
+        );
+    }
+    // One finding per demonstration counts all outliers.
+    let mut positions = noisy(0.005);
+    [30, 60, 100, 101, 170].iter().for_each(|&c| positions[0][[c, 0]] += 0.3);
+    let found = inspect(&demos(positions), None);
+    assert!(matches!(found[..], [Finding::Outlier { demo: 0, others: 3, .. }]), "{found:?}");
+    // A sensor that repeats its value for 30 samples of a movement.
+    for noise in [0.0, 0.005] {
+        let mut positions = noisy(noise);
+        let held = positions[2][[70, 0]];
+        positions[2].slice_mut(s![71..100, 0]).fill(held);
+        let found = inspect(&demos(positions), None);
+        let [Finding::Stuck { demo: 2, from, to, step, .. }] = &found[..] else { panic!("{found:?}") };
+        assert_eq!((from.sample, to.sample), (70, 99));
+        assert!(*step > 0.2);
+    }
+}
+
+#[test]
+fn ten_spikes_in_every_demonstration_are_found_in_all() {
+    let mut positions = noisy(0.003);
+    for (m, y) in positions.iter_mut().enumerate() {
+        for (k, sign) in noise(100 + m).take(10).enumerate() {
+            y[[12 + 18 * k, k % 2]] += 0.3 * sign.signum();
+        }
+    }
+    let found = inspect(&demos(positions), None);
+    let places: Vec<_> = found
+        .iter()
+        .map(|finding| match finding {
+            Finding::Outlier { demo, others, .. } => (*demo, *others),
+            other => panic!("{other}"),
+        })
+        .collect();
+    assert_eq!(places, [0, 1, 2, 3, 4].map(|demo| (demo, 9)));
+}
+
+/// Signals of time in seconds and of the duration of the recording, with details of at least 50 ms.
+const SIGNALS: [fn(f64, f64) -> f64; 6] = [
+    |t, duration| rise(t / duration),
+    |t, duration| rise((t - 0.4 * duration) / 0.2), // fast, between rests
+    |t, duration| 0.5 * rise(3.0 * t / duration) + 0.5 * rise(3.0 * t / duration - 2.0), // a rest within
+    |t, _| 0.5 * (TAU * t / 1.1).sin() + 0.3 * (2.0 * TAU * t / 1.1 + 0.4).sin() + 0.1 * (3.0 * TAU * t / 1.1).sin(),
+    |t, duration| (2.0 * t / duration - 0.4).clamp(0.0, 1.0), // constant velocity
+    |t, _| {
+        // Acceleration with an impact and its ringing in each step.
+        let after = (t - 0.3).rem_euclid(0.55);
+        0.3 * (TAU * t / 1.1).sin() + (-after / 0.05).exp() * (TAU * after / 0.1).sin()
+    },
+];
+
+fn rise(s: f64) -> f64 {
+    let s = s.clamp(0.0, 1.0);
+    s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
+}
+
+#[test]
+fn movements_with_noise_and_quantisation_at_any_rate_have_no_finding() {
+    let mut n_cases = 0;
+    for rate in [50.0, 100.0, 250.0, 1000.0] {
+        for (k, signal) in SIGNALS.iter().enumerate() {
+            for (size, colour) in [(0.0, 0.0), (1e-3, 0.0), (0.01, 0.0), (0.05, 0.0), (0.01, 0.95), (0.002, 1.0)] {
+                for quantum in [0.0, 5e-4, 5e-3, 0.03] {
+                    for jitter in [0.0, 0.3] {
+                        n_cases += 1;
+                        let mut random = noise(n_cases);
+                        // A sum of uniform numbers is nearly normal; `colour` is its autocorrelation.
+                        let mut normal = || size * random.by_ref().take(6).sum::<f64>() / 2f64.sqrt();
+                        let n = (2.0 * rate) as usize;
+                        let (mut time, mut added) = (Vec::new(), normal());
+                        let position = Array2::from_shape_fn((n, 1), |(c, _)| {
+                            let t = (c as f64 + jitter * ((7 * c) as f64).sin() / 2.0) / rate;
+                            time.push(t);
+                            added = colour * added + normal();
+                            let y = signal(t, n as f64 / rate) + added;
+                            if quantum > 0.0 { (y / quantum).round() * quantum } else { y }
+                        });
+                        let demo = Demonstration::new(position, Sampling::Stamped { time }).unwrap();
+                        let mut found = inspect(&[demo], None);
+                        // A quantised rest may look like padding.
+                        found.retain(|finding| !matches!(finding, Finding::Padded { .. }));
+                        assert_eq!(found, [], "signal {k}, {rate} Hz, noise {size} {colour}, quantum {quantum}");
+                    }
+                }
+            }
+        }
+    }
+    assert_eq!(n_cases, 4 * 6 * 6 * 4 * 2);
+}
+
+#[test]
+fn a_jump_is_a_wrap_only_if_whole_turns_explain_it() {
+    let found = |size: f64, at: usize| {
+        let mut positions = noisy(0.003);
+        positions[3].slice_mut(s![at.., 1]).map_inplace(|y| *y += size);
+        inspect(&with_units(demos(positions), &["rad", "rad"]), None)
+    };
+    for size in [3.3, 4.0, 30.0] {
+        assert!(matches!(found(size, 60)[..], [Finding::Jump { demo: 3, .. }]), "{size}: {:?}", found(size, 60));
+    }
+    for turns in [1.0, -1.0, 5.0] {
+        let found = found(turns * TAU, 60);
+        assert!(matches!(found[..], [Finding::Wrap { demo: 3, .. }]), "{found:?}");
+        let text = if turns.abs() == 1.0 { "about a full turn of 6.2832" } else { "about 5 full turns of 6.2832" };
+        assert!(found[0].to_string().contains(text), "{}", found[0]);
+    }
+}
+
+#[test]
+fn another_unit_of_angle_or_time_is_found_by_the_magnitude() {
+    let in_units = |factor: f64, time: f64| {
+        let demo = |(m, y): (usize, Array2<f64>)| {
+            let (factor, time) = if m == 2 { (factor, time) } else { (1.0, 1.0) };
+            Demonstration::new(y * factor, Sampling::Uniform { dt: 0.01 * time }).unwrap()
+        };
+        inspect(&reaches().into_iter().enumerate().map(demo).collect::<Vec<_>>(), None)
+    };
+    assert_eq!(in_units(4.0, 4.0), []);
+    for (factor, text) in [
+        (180.0 / std::f64::consts::PI, "degrees among radians?"),
+        (std::f64::consts::PI / 180.0, "radians among degrees?"),
+        (1000.0, "mm among m?"),
+        (1e6, "check its units"),
+    ] {
+        let found = in_units(factor, 1.0);
+        let [Finding::OtherRange { demo: 2, ratio, .. }] = &found[..] else { panic!("{found:?}") };
+        assert!((0.6..1.7).contains(&(ratio / factor)), "{ratio}");
+        assert!(found[0].to_string().contains(text), "{}", found[0]);
+    }
+    for (factor, text) in
+        [(1e3, "ms among s?"), (1e-3, "s among ms?"), (1e6, "µs among s?"), (30.0, "check its time stamps")]
+    {
+        let found = in_units(1.0, factor);
+        let [Finding::OtherDuration { demo: 2, ratio, .. }] = &found[..] else { panic!("{found:?}") };
+        assert!((ratio / factor - 1.0).abs() < 1e-9);
+        assert!(found[0].to_string().contains(text), "{}", found[0]);
+    }
+    // A single degree of freedom at rest in one demonstration, and a column that moves in a single one, are movements.
+    let mut positions: Vec<_> = reaches().into_iter().map(|y| y.slice_move(s![.., 1..])).collect();
+    positions[1] *= 1e-3;
+    assert_eq!(inspect(&demos(positions), None), []);
+    let mut positions = reaches();
+    positions.iter_mut().enumerate().for_each(|(m, y)| {
+        let factor = if m == 1 { 100.0 } else { 1.0 };
+        y.column_mut(1).map_inplace(|y| *y *= factor);
+    });
+    assert_eq!(inspect(&demos(positions), None), []);
+}
+
+#[test]
+fn missing_rows_are_found_where_they_leave_the_movement_open() {
+    let cut = |position: &Array2<f64>, from: usize, n_missing: usize| {
+        let kept: Vec<usize> = (0..position.nrows()).filter(|c| !(from..from + n_missing).contains(c)).collect();
+        let time = kept.iter().map(|&c| 0.01 * c as f64).collect();
+        let demo = Demonstration::new(position.select(ndarray::Axis(0), &kept), Sampling::Stamped { time }).unwrap();
+        inspect(&[demo], None)
+    };
+    let reach = &noisy(0.003)[3];
+    for (from, n_missing) in [(50, 1), (50, 4), (90, 20), (20, 20)] {
+        assert_eq!(cut(reach, from, n_missing), []);
+    }
+    for n_missing in [70, 110] {
+        let found = cut(reach, 50, n_missing);
+        let [Finding::MissingRows { demo: 0, from, to, ratio, .. }] = &found[..] else { panic!("{found:?}") };
+        assert_eq!((from.sample, to.sample), (49, 50));
+        assert!((ratio - (n_missing + 1) as f64).abs() < 0.1);
+        assert!(found[0].to_string().contains("no samples between sample 49 (t = 0.49 s) and"), "{}", found[0]);
+    }
+    // A half of a cycle among ten.
+    let gait = Array2::from_shape_fn((1000, 1), |(c, _)| (TAU * c as f64 / 100.0).sin());
+    assert_eq!(cut(&gait, 440, 8), []);
+    let found = cut(&gait, 440, 45);
+    assert!(matches!(&found[..], [Finding::MissingRows { error: Some((dof, _)), .. }] if dof == "y0"), "{found:?}");
 }

@@ -522,6 +522,22 @@ fn short_gaps_are_interpolated_and_other_samples_unchanged() {
     assert!(message.contains("column 'a': no sample between t = 0.39 s and t = 0.44 s"), "{message}");
 }
 
+/// Rows that are missing over more than `max_gap` are reported with their times; the usual interval may exceed it.
+#[test]
+fn missing_rows_are_rejected_beyond_a_positive_max_gap() {
+    let time: Vec<f64> =
+        even(100).into_iter().enumerate().filter(|(c, _)| !(40..60).contains(c)).map(|(_, t)| t).collect();
+    let position = Array2::from_elem((80, 1), 1.0);
+    let fill = |max_gap| preprocessing::fill_gaps(position.clone(), &time, &["a".into()], &[0.0], max_gap);
+    assert!(fill(0.0).is_ok() && fill(0.22).is_ok());
+    for max_gap in [0.001, 0.2] {
+        let message = fill(max_gap).unwrap_err().to_string();
+        assert!(message.starts_with("no row between t = 0.39 s and t = 0.6 s"), "{message}");
+    }
+    let even = even(80);
+    assert!(preprocessing::fill_gaps(position.clone(), &even, &["a".into()], &[0.0], 0.001).is_ok());
+}
+
 /// Gaps at an end, empty columns and an invalid `max_gap` are rejected.
 #[test]
 fn gaps_that_cannot_be_filled_are_rejected() {

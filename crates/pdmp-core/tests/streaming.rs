@@ -235,6 +235,33 @@ fn bytes_keep_every_part() {
     }
 }
 
+/// Wrong-looking samples and magnitudes are reported as by a fit of all demonstrations, with indices among all.
+#[test]
+fn findings_are_those_of_all_demonstrations() {
+    let mut demos = recordings(Kind::Discrete, 0.0, 17);
+    let mut change = |m: usize, time: f64, change: &dyn Fn(usize, f64) -> f64| {
+        let Sampling::Uniform { dt } = *demos[m].sampling() else { unreachable!() };
+        let position =
+            Array2::from_shape_fn(demos[m].position().dim(), |(c, d)| change(c, demos[m].position()[[c, d]]));
+        let changed = Demonstration::new(position, Sampling::Uniform { dt: dt * time }).unwrap();
+        let context = demos[m].context().unwrap().to_vec();
+        demos[m] = changed.with_context(context).unwrap();
+    };
+    change(23, 1.0, &|c, y| if c == 60 { y + 30.0 } else { y });
+    change(41, 1.0, &|_, y| y * 57.3);
+    change(55, 1000.0, &|_, y| y);
+    let options = FitOptions::discrete().smoothing(Smoothing::Interpolate);
+    let whole = fit(&demos, &options).unwrap().learnt().findings.clone();
+    let text: Vec<String> = whole.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        text.iter().map(|text| text.split(':').next().unwrap()).collect::<Vec<_>>(),
+        ["demo 23", "demo 41", "demo 55"]
+    );
+    for size in [7, N_DEMOS] {
+        assert_eq!(streamed(&demos, size, &options).0.learnt().findings, whole);
+    }
+}
+
 /// Options and demonstrations that blocks do not allow are refused with the argument, and leave a partial fit as it is.
 #[test]
 fn unsuitable_arguments_are_named() {

@@ -128,9 +128,10 @@ use crate::warp::time_scaling_of;
 /// Warns
 /// -----
 /// UserWarning
-///     Implausible samples, with their positions: time stamps much closer than the others, dropouts recorded as zeros,
-///     padding, counters or time stamps among the columns, wrapped angles, angles of different demonstrations whole
-///     turns apart (subtracted if units mark them as angles), and an `alpha_z` too high for the sampling rate.
+///     Implausible samples, with their positions: outliers, jumps, stuck sensors, dropouts recorded as zeros, padding,
+///     missing rows, time stamps much closer than the others, counters or time stamps among the columns, wrapped angles,
+///     angles of different demonstrations whole turns apart (subtracted if units mark them as angles); ranges or a
+///     duration 15 times those of the other demonstrations; and an `alpha_z` too high for the sampling rate.
 ///
 /// Raises
 /// ------

@@ -241,7 +241,8 @@ pub(crate) fn period(py: Python<'_>, demo: &Bound<'_, PyAny>) -> PyResult<f64> {
 /// Raises
 /// ------
 /// ValueError
-///     A gap is longer than `max_gap`, or lies at an end.
+///     A gap is longer than `max_gap`, or lies at an end; or time stamps are further apart than a
+///     positive `max_gap` and than five usual intervals.
 #[pyfunction]
 pub(crate) fn fill_gaps<'py>(
     py: Python<'py>,

@@ -46,7 +46,8 @@ def read_csv(
         Sampling interval [s], instead of time stamps.
     max_gap : float
         Longest gap [s] to interpolate, from the sample before to the sample after it; by default 0,
-        none. A gap is an empty field, NaN, NA or null, not a missing row.
+        none. A gap is an empty field, NaN, NA or null. Rows with time stamps further apart than a
+        positive `max_gap`, and than five usual intervals, are an error.
     context : sequence of float or str, optional
         Context (Q,) of the demonstration.
 

@@ -12,15 +12,19 @@ impl fmt::Display for Times {
 }
 
 /// A stretch without samples, and its remedy.
-pub(super) struct Gap(pub(super) f64, pub(super) f64, pub(super) f64);
+pub(super) struct Gap<'a>(pub(super) &'a str, pub(super) f64, pub(super) f64, pub(super) f64);
 
-impl fmt::Display for Gap {
+impl fmt::Display for Gap<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Gap(from, to, max_gap) = *self;
+        let Gap(column, from, to, max_gap) = *self;
+        let missing = if column.is_empty() { "row" } else { "sample" };
+        if !column.is_empty() {
+            write!(f, "column '{column}': ")?;
+        }
         match (from.is_finite(), to.is_finite()) {
             (true, true) => write!(
                 f,
-                "no sample between t = {from} s and t = {to} s: that is longer than max_gap = {max_gap} s; raise max_gap, \
+                "no {missing} between t = {from} s and t = {to} s: that is longer than max_gap = {max_gap} s; raise max_gap, \
                  or cut the recording there"
             ),
             (false, true) => write!(f, "no sample before t = {to} s, where none can be interpolated: cut the rows out"),

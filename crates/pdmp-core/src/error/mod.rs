@@ -176,9 +176,9 @@ pub enum Error {
         previous: f64,
     },
     /// Samples that are missing over too long a time.
-    #[error("column '{column}': {}", Gap(*from, *to, *max_gap))]
+    #[error("{}", Gap(column, *from, *to, *max_gap))]
     Gap {
-        /// Name of the column.
+        /// Name of the column; "" if rows are missing.
         column: String,
         /// Time of the last sample before the gap, in seconds; −∞ where there is none.
         from: f64,

@@ -7,8 +7,13 @@ use ndarray::Array2;
 use crate::demonstration::MIN_SAMPLES_PER_DEMONSTRATION;
 use crate::error::{Error, Result};
 use crate::numerics::spline::Knots;
-use crate::numerics::statistics::range;
+use crate::numerics::statistics::{range, upper_median};
 use crate::validate::{check_length, check_range, check_time};
+
+/// Minimum interval between rows that are reported as missing, relative to the median one.
+pub(super) const MIN_MISSING_INTERVALS: f64 = 5.0;
+/// Relative margin that admits a gap of exactly `max_gap` between rounded time stamps.
+const MARGIN: f64 = 1e-9;
 
 /// Fills the gaps of `position` (T, D), samples that are NaN, by the cubic spline through the other samples of the column.
 ///
@@ -29,7 +34,8 @@ use crate::validate::{check_length, check_range, check_time};
 /// ```
 ///
 /// # Errors
-/// A gap longer than `max_gap` seconds, or at either end; a change by about a full turn through a gap of a column of
+/// A gap longer than `max_gap` seconds, or at either end; an interval between `time` longer than a positive `max_gap` and
+/// than five usual ones, where rows are missing; a change by about a full turn through a gap of a column of
 /// unknown unit; a column with fewer than four samples; times that do not increase.
 pub fn fill_gaps(
     mut position: Array2<f64>,
@@ -42,6 +48,9 @@ pub fn fill_gaps(
     let (n_samples, n_dofs) = position.dim();
     check_length("names", names.len(), n_dofs, "DoF")?;
     check_length("turns", turns.len(), n_dofs, "DoF")?;
+    if max_gap > 0.0 && time.len() > 1 {
+        check_rows(time, max_gap)?;
+    }
     if !position.iter().any(|y| y.is_nan()) {
         return Ok(position);
     }
@@ -72,6 +81,16 @@ pub fn fill_gaps(
     Ok(position)
 }
 
+/// Checks the intervals between rows.
+fn check_rows(time: &[f64], max_gap: f64) -> Result<()> {
+    let length = |pair: &[f64]| pair[1] - pair[0];
+    let limit = max_gap.max(MIN_MISSING_INTERVALS * upper_median(time.windows(2).map(length)));
+    match time.windows(2).find(|pair| length(pair) > limit * (1.0 + MARGIN)) {
+        Some(pair) => Err(Error::Gap { column: String::new(), from: pair[0], to: pair[1], max_gap }),
+        None => Ok(()),
+    }
+}
+
 /// Checks the gaps between the present samples and at both ends.
 fn check_gaps(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Result<()> {
     let gap = |from, to| Error::Gap { column: name.to_string(), from, to, max_gap };
@@ -84,8 +103,7 @@ fn check_gaps(present: &[usize], time: &[f64], name: &str, max_gap: f64) -> Resu
     if last + 1 < time.len() {
         return Err(gap(time[last], f64::INFINITY));
     }
-    // The margin admits a gap of exactly `max_gap` between rounded time stamps.
-    let limit = max_gap * (1.0 + 1e-9);
+    let limit = max_gap * (1.0 + MARGIN);
     match present.windows(2).find(|pair| pair[1] > pair[0] + 1 && time[pair[1]] - time[pair[0]] > limit) {
         Some(pair) => Err(gap(time[pair[0]], time[pair[1]])),
         None if present.len() < MIN_SAMPLES_PER_DEMONSTRATION => {

@@ -19,6 +19,7 @@ use crate::learning::style_selection::singular_values::{Recorded, noise_limit, s
 use crate::learning::targets::lag_target;
 use crate::model::{DemonstrationParameters, Finding, FitSummary, Model, Moments};
 use crate::numerics::orthonormal_span::OrthonormalSpan;
+use crate::preprocessing::inspection::apart;
 
 /// Factorised targets of a [`PartialFit`], which await the styles of its demonstrations.
 #[derive(Clone)]
@@ -101,6 +102,7 @@ impl PartialFit {
         factors.singular_values.truncate(n_demos);
 
         let mut findings = self.findings.clone();
+        findings.extend(apart(&self.summaries.magnitudes(), &settings.units));
         findings.extend(noise_findings::noisy(&settings.noise(), &self.ranges, &settings.names, &settings.units));
         if settings.units.iter().all(String::is_empty) {
             let squares = |d| noise_findings::squares(targets.view(), self.n_dofs(), d);

@@ -22,7 +22,7 @@ use crate::model::responses::Curves;
 use crate::numerics::threads::Threads;
 
 /// Version of the format.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 /// Metadata key of the constants.
 const KEY: &str = "pdmp-partial";
 
@@ -200,6 +200,7 @@ impl PartialFit {
             list("anchors", summaries.anchors.clone()),
             list("durations", summaries.durations.clone()),
             list("n_recorded", summaries.n_recorded.iter().map(|n| *n as f64).collect()),
+            list("magnitudes", summaries.magnitudes.clone()),
             list("contexts", summaries.contexts.iter().flat_map(numbers).collect()),
         ];
         write(PARTIAL, constants, arrays)
@@ -230,6 +231,7 @@ impl PartialFit {
         let durations = reader.array("durations", &[n_demos])?;
         ensure(durations.iter().all(|seconds| *seconds > 0.0), "a duration is not positive")?;
         let n_recorded = reader.array("n_recorded", &[n_demos])?.into_iter().map(|n| n as usize).collect();
+        let magnitudes = reader.array("magnitudes", &[n_demos * (n_dofs + 1)])?;
         let numbers = reader.array("contexts", &[n_demos * n_contexts])?;
         reader.close(crc32)?;
         let mut summaries = Summaries::none(n_dofs, &partial.settings.contexts);
@@ -245,7 +247,7 @@ impl PartialFit {
                 }
             }
         }
-        partial.summaries = Summaries { starts, goals, anchors, durations, n_recorded, ..summaries };
+        partial.summaries = Summaries { starts, goals, anchors, durations, n_recorded, magnitudes, ..summaries };
         partial.regressors = regressors;
         Ok(partial)
     }

@@ -13,7 +13,7 @@ use crate::learning::targets::Targets;
 use crate::learning::transport_profile::{ProfileSums, profile_samples};
 use crate::model::Finding;
 use crate::numerics::threads::Threads;
-use crate::preprocessing::inspection::{cycle_ends, inspect};
+use crate::preprocessing::inspection::{Inspected, cycle_ends, inspect_block};
 use crate::validate::zeros;
 
 /// Largest number of findings that are kept.
@@ -253,9 +253,10 @@ impl PartialFit {
         })
     }
 
-    /// Keeps the findings about a block.
+    /// Keeps the findings about a block, and the magnitudes of its demonstrations.
     fn inspect(&mut self, block: &[Demonstration], first: usize) {
-        let mut findings = inspect(block, None);
+        let Inspected { mut findings, magnitudes } = inspect_block(block, self.settings.dt);
+        self.summaries.magnitudes.extend(magnitudes.into_iter().flatten());
         if self.settings.canonical.kind() == Kind::Rhythmic {
             findings.extend(cycle_ends(block));
         }

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::learning::targets::Targets;
 use crate::validate::check_length;
 
-/// Start, goal, anchor, duration, number of samples and context of each demonstration.
+/// Start, goal, anchor, duration, number of samples, ranges and context of each demonstration.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Summaries {
     pub(super) n_dofs: usize,
@@ -18,6 +18,8 @@ pub(super) struct Summaries {
     pub(super) anchors: Vec<f64>,
     pub(super) durations: Vec<f64>,
     pub(super) n_recorded: Vec<usize>,
+    /// Ranges and duration as recorded (M, D + 1).
+    pub(super) magnitudes: Vec<f64>,
     pub(super) contexts: Vec<Values>,
 }
 
@@ -37,8 +39,8 @@ impl Summaries {
             ContextScale::Label => Values::Labels(Vec::new(), Vec::new()),
         });
         let contexts = contexts.collect();
-        let [starts, goals, anchors, durations] = [(); 4].map(|()| Vec::new());
-        Self { n_dofs, starts, goals, anchors, durations, n_recorded: Vec::new(), contexts }
+        let [starts, goals, anchors, durations, magnitudes] = [(); 5].map(|()| Vec::new());
+        Self { n_dofs, starts, goals, anchors, durations, n_recorded: Vec::new(), magnitudes, contexts }
     }
 
     /// Returns the number of demonstrations M.
@@ -86,6 +88,7 @@ impl Summaries {
         self.anchors.extend(&other.anchors);
         self.durations.extend(&other.durations);
         self.n_recorded.extend(&other.n_recorded);
+        self.magnitudes.extend(&other.magnitudes);
         for (own, others) in self.contexts.iter_mut().zip(&other.contexts) {
             match (own, others) {
                 (Values::Numbers(own), Values::Numbers(others)) => own.extend(others),
@@ -96,6 +99,11 @@ impl Summaries {
                 _ => {}
             }
         }
+    }
+
+    /// Returns the ranges and the duration of each demonstration as recorded.
+    pub(super) fn magnitudes(&self) -> Vec<Vec<f64>> {
+        self.magnitudes.chunks(self.n_dofs + 1).map(<[f64]>::to_vec).collect()
     }
 
     /// Returns the types of the contexts (Q,) and the contexts as numbers (M, Q); `None` without contexts.

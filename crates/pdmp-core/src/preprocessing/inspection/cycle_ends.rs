@@ -3,7 +3,6 @@
 use super::{Finding, Survey};
 use crate::demonstration::{Demonstration, Sampling, turn_of};
 use crate::numerics::rotation::dot;
-use crate::numerics::statistics::range;
 
 /// Minimum step from the end of a cycle to its start, relative to the largest step within it, that is reported.
 const MIN_RATIO: f64 = 4.0;
@@ -46,13 +45,13 @@ fn ends_of(demo: usize, survey: &Survey) -> Option<Finding> {
     let mut squares = [0.0; 4];
     for d in 0..survey.n_dofs {
         let (column, turn) = (survey.column(d), turn_of(survey.demo.units().map_or("", |units| &units[d])));
-        let range = range(column.iter());
+        let range = survey.ranges[d];
         if range <= rounding {
             continue;
         }
         let opening = closing_sign(survey, d) * column[0] - column[last];
         let opening = turn.map_or(opening, |turn| opening - (opening / turn).round() * turn).abs();
-        let (largest, share) = (survey.largest_step(d), opening / range);
+        let (largest, share) = (survey.steps[d], opening / range);
         if opening > MIN_RATIO * largest && share > max_share {
             max_share = share;
             let (dof, ratio) = (survey.name(d), opening / largest);

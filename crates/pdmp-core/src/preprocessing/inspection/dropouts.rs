@@ -23,7 +23,7 @@ struct Run {
 /// Finds the runs of zeros of a demonstration; degrees of freedom that were lost simultaneously share one finding.
 pub(super) fn zeros(demo: usize, survey: &Survey) -> Vec<Finding> {
     let n = survey.n_samples();
-    if n < MIN_SAMPLES || !survey.zero || survey.step == 0.0 {
+    if n < MIN_SAMPLES || !survey.zero || survey.largest_step() == 0.0 {
         return Vec::new();
     }
     let rounding = survey.rounding();

@@ -6,15 +6,21 @@
 //! | `dropouts` | lost samples that were written as exact zeros |
 //! | `padding` | rows that were appended to make recordings equally long |
 //! | `counters` | a column that counts samples, or repeats the time stamps |
+//! | `jumps` | outliers, jumps, and sensors that are stuck in motion |
+//! | `missing_rows` | intervals between time stamps within which the movement is not determined |
+//! | `magnitudes` | demonstrations whose ranges or duration are of another order of magnitude, as in another unit |
 //! | `turns` | angles that jump by a full turn, or that are offset by whole turns between demonstrations |
 //! | `cycle_ends` | cycles that are not closed, or repeat their first sample |
 //!
-//! One pass over the samples computes the largest step and detects zeros, which rules out most faults cheaply. A fit adds
+//! One pass over the samples computes ranges and largest steps and detects zeros, which rules out most faults cheaply. A fit adds
 //! its own findings, such as gains whose transients the samples do not resolve (`learning/stiffness.rs`).
 
 mod counters;
 mod cycle_ends;
 mod dropouts;
+mod jumps;
+mod magnitudes;
+mod missing_rows;
 mod padding;
 mod quaternions;
 mod time_stamps;
@@ -28,6 +34,7 @@ pub use crate::model::finding::{Finding, Padding};
 use crate::validate::row_major;
 
 pub use cycle_ends::cycle_ends;
+pub(crate) use magnitudes::apart;
 pub use turns::unwound;
 pub(crate) use turns::{REFERENCE_SAMPLES, reference, unwound_from};
 
@@ -38,8 +45,8 @@ const MIN_SAMPLES: usize = 10;
 /// angle of a joint that is not tracked, has errors of 3e-16 in recorded BVH files; products of many rotations have more.
 const ROUNDING: f64 = 1e-12;
 
-/// Number of values that are processed in parallel, for vector registers.
-const LANES: usize = 8;
+/// Approximate number of values that are processed together.
+const LANES: usize = 64;
 
 /// Returns the implausible samples of demonstrations of one skill.
 ///
@@ -58,18 +65,42 @@ const LANES: usize = 8;
 /// # }
 /// ```
 pub fn inspect(demos: &[Demonstration], dt: Option<f64>) -> Vec<Finding> {
+    let Inspected { mut findings, magnitudes } = inspect_block(demos, dt);
+    let n_coordinates = demos.first().map_or(0, Demonstration::n_coordinates);
+    let units = demos.iter().find_map(Demonstration::units);
+    findings.extend(apart(&magnitudes, &units.map_or_else(|| vec![String::new(); n_coordinates], <[String]>::to_vec)));
+    findings
+}
+
+/// Result of an inspection of a block of demonstrations.
+pub(crate) struct Inspected {
+    /// Findings but those of [`apart`], which need all demonstrations.
+    pub(crate) findings: Vec<Finding>,
+    /// Ranges of the coordinates and duration in seconds of each demonstration (M, D + 1); 0 where unknown.
+    pub(crate) magnitudes: Vec<Vec<f64>>,
+}
+
+/// Inspects a block of demonstrations.
+pub(crate) fn inspect_block(demos: &[Demonstration], dt: Option<f64>) -> Inspected {
     let surveys: Vec<Survey> = demos.iter().map(|demo| Survey::new(demo, dt)).collect();
-    let mut findings = Vec::new();
+    let padded = padding::rows(&surveys);
+    let (mut findings, mut magnitudes) = (Vec::new(), Vec::new());
     for (m, survey) in surveys.iter().enumerate() {
         findings.extend(time_stamps::close(m, survey));
-        findings.extend(dropouts::zeros(m, survey));
-        findings.extend(turns::wraps(m, survey));
+        findings.extend(missing_rows::interval(m, survey));
+        let mut known = dropouts::zeros(m, survey);
+        known.extend(turns::wraps(m, survey));
+        let n_own = known.len();
+        known.extend(padded.iter().cloned());
+        let (steps, unusual) = jumps::steps(m, survey, &known);
+        magnitudes.push(magnitudes::magnitudes_of(m, survey, &known, &unusual));
+        findings.extend(known.into_iter().take(n_own).chain(steps));
     }
-    findings.extend(padding::rows(&surveys));
+    findings.extend(padded);
     findings.extend(counters::columns(&surveys));
     findings.extend(turns::apart(&surveys));
     findings.extend(quaternions::undeclared(&surveys));
-    findings
+    Inspected { findings, magnitudes }
 }
 
 /// Demonstration with statistics from one pass over its samples.
@@ -77,8 +108,12 @@ struct Survey<'a> {
     demo: &'a Demonstration,
     dt: Option<f64>,
     n_dofs: usize,
-    /// Largest step of any degree of freedom from one sample to the next.
-    step: f64,
+    /// Range of each coordinate.
+    ranges: Vec<f64>,
+    /// Largest step of each coordinate from one sample to the next.
+    steps: Vec<f64>,
+    /// Largest magnitude of any coordinate.
+    size: f64,
     /// True if any sample is exactly zero.
     zero: bool,
 }
@@ -89,31 +124,41 @@ impl<'a> Survey<'a> {
         let position = demo.position();
         let position = position.as_standard_layout();
         let values = row_major(&position);
-        let (mut steps, mut zero) = ([0.0f64; LANES], false);
-        let mut add = |lane: usize, value: f64, before: f64| {
-            let step = (value - before).abs();
-            steps[lane] = if step > steps[lane] { step } else { steps[lane] };
-            zero |= value == 0.0;
-        };
-        let (later, earlier) = (&values[n_dofs..], &values[..values.len() - n_dofs]);
-        let (whole, rest) = (later.chunks_exact(LANES), later.len() / LANES * LANES);
-        for (later, earlier) in whole.zip(earlier.chunks_exact(LANES)) {
-            (0..LANES).for_each(|lane| add(lane, later[lane], earlier[lane]));
+        // Many rows at a time, for vector registers.
+        let length = n_dofs * (LANES / n_dofs).max(1);
+        let first = || values[..n_dofs].iter().copied().cycle().take(length);
+        let (mut low, mut high, mut steps): (Vec<f64>, Vec<f64>, _) =
+            (first().collect(), first().collect(), vec![0.0f64; length]);
+        for (rows, before) in values[n_dofs..].chunks(length).zip(values.chunks(length)) {
+            let extremes = low.iter_mut().zip(&mut high).zip(&mut steps);
+            for (((low, high), largest), (y, before)) in extremes.zip(rows.iter().zip(before)) {
+                let step = (y - before).abs();
+                *largest = if step > *largest { step } else { *largest };
+                *low = if *y < *low { *y } else { *low };
+                *high = if *y > *high { *y } else { *high };
+            }
         }
-        later[rest..].iter().zip(&earlier[rest..]).for_each(|(later, earlier)| add(0, *later, *earlier));
-        zero |= values[..n_dofs].contains(&0.0);
-        Self { demo, dt, n_dofs, step: steps.into_iter().fold(0.0, f64::max), zero }
+        let of_columns = |all: &[f64], better: fn(f64, f64) -> f64| -> Vec<f64> {
+            (0..n_dofs).map(|d| all[d..].iter().step_by(n_dofs).copied().reduce(better).unwrap_or(0.0)).collect()
+        };
+        let (low, high) = (of_columns(&low, f64::min), of_columns(&high, f64::max));
+        let steps = of_columns(&steps, f64::max);
+        let may_be_zero = low.iter().zip(&high).any(|(low, high)| *low <= 0.0 && *high >= 0.0);
+        let has_zero = |part: &[f64]| part.iter().fold(false, |zero, y| zero | (*y == 0.0));
+        let zero = may_be_zero && values.chunks(LANES).any(has_zero);
+        let size = low.iter().chain(&high).fold(0.0f64, |most, y| most.max(y.abs()));
+        let ranges = low.iter().zip(&high).map(|(low, high)| high - low).collect();
+        Self { demo, dt, n_dofs, ranges, steps, size, zero }
     }
 
-    /// Returns the largest step between neighbouring samples of a degree of freedom.
-    fn largest_step(&self, d: usize) -> f64 {
-        let column = self.column(d);
-        (1..column.len()).fold(0.0, |step, c| step.max((column[c] - column[c - 1]).abs()))
+    /// Returns the largest step of any coordinate from one sample to the next.
+    fn largest_step(&self) -> f64 {
+        self.steps.iter().fold(0.0, |most, step| most.max(*step))
     }
 
     /// Returns the size of steps that are rounding errors.
     fn rounding(&self) -> f64 {
-        ROUNDING * self.demo.position().iter().fold(0.0f64, |most, value| most.max(value.abs()))
+        ROUNDING * self.size
     }
 
     fn n_samples(&self) -> usize {

@@ -66,6 +66,6 @@ fn stops_abruptly(survey: &Survey, last: usize) -> bool {
         && (0..survey.n_dofs).any(|d| {
             let column = survey.column(d);
             let step = (column[last] - column[last - 1]).abs();
-            step > rounding && step > ABRUPT_STEP * survey.largest_step(d)
+            step > rounding && step > ABRUPT_STEP * survey.steps[d]
         })
 }

@@ -6,8 +6,9 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-use super::{Finding, Survey};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
+
+use super::{Finding, Survey, jumps};
 
 use crate::demonstration::{Demonstration, turn_of};
 use crate::numerics::statistics::{extremes, range};
@@ -22,6 +23,11 @@ const MAX_TURNS_UNKNOWN: f64 = 3.0;
 const WRAPS: [f64; 2] = [0.9, 1.02];
 /// Maximum step of such an angle elsewhere, in turns.
 const MAX_STEP: f64 = 0.1;
+
+/// Maximum step that remains of a wrap of an angle of known unit without whole turns, in turns.
+const MAX_REMAINDER: f64 = 0.1;
+/// Maximum step that remains of such a wrap, relative to the steps nearby.
+const MAX_REMAINDER_RATIO: f64 = 3.0;
 
 /// Kind of the unit of a degree of freedom.
 enum Unit {
@@ -40,13 +46,13 @@ fn unit(demo: &Demonstration, d: usize) -> Unit {
     }
 }
 
-/// Finds the first jump by a full turn of each angle of a demonstration.
+/// Finds the first jump by full turns of each angle of a demonstration.
 pub(super) fn wraps(demo: usize, survey: &Survey) -> Vec<Finding> {
     let mut findings = Vec::new();
     // A wrap is a step of more than half a turn, π in the smallest unit.
-    let candidates = if survey.step > 0.5 * TAU { 0..survey.n_dofs } else { 0..0 };
+    let candidates = if survey.largest_step() > 0.5 * TAU { 0..survey.n_dofs } else { 0..0 };
     for d in candidates.filter(|d| !matches!(unit(survey.demo, *d), Unit::Other)) {
-        let (column, largest_step) = (survey.column(d), survey.largest_step(d));
+        let (column, largest_step) = (survey.column(d), survey.steps[d]);
         let first_jump = |turn: f64, min: f64, max: f64| {
             let jump = |c: usize| column[c] - column[c - 1];
             let at = (1..column.len()).find(|&c| (min..=max).contains(&(jump(c).abs() / turn)))?;
@@ -55,7 +61,10 @@ pub(super) fn wraps(demo: usize, survey: &Survey) -> Vec<Finding> {
         let wrap = match unit(survey.demo, d) {
             Unit::Other => None,
             Unit::Angle(turn) if largest_step <= 0.5 * turn => None,
-            Unit::Angle(turn) => first_jump(turn, 0.5, f64::INFINITY),
+            Unit::Angle(turn) => {
+                let at = (1..column.len()).find(|&c| is_wrap(column, c, turn));
+                at.map(|c| (c, column[c] - column[c - 1], turn))
+            }
             Unit::Unknown => [TAU, 360.0].into_iter().find_map(|turn| {
                 let may_wrap = largest_step >= WRAPS[0] * turn && range(column) <= WRAPS[1] * turn;
                 // Jumps to or from zero may be lost samples.
@@ -73,6 +82,14 @@ pub(super) fn wraps(demo: usize, survey: &Survey) -> Vec<Finding> {
         }
     }
     findings
+}
+
+/// Returns whether the step to the sample `c` is like those nearby but for whole turns.
+fn is_wrap(column: ArrayView1<f64>, c: usize, turn: f64) -> bool {
+    let step = |c: usize| column[c] - column[c - 1];
+    let within_turn = |c: usize| (step(c) - (step(c) / turn).round() * turn).abs();
+    let usual = jumps::second_largest(c, column.len(), within_turn);
+    step(c).abs() > 0.5 * turn && within_turn(c) <= f64::max(MAX_REMAINDER * turn, MAX_REMAINDER_RATIO * usual)
 }
 
 /// Finds the angles that are offset by whole turns from those of most demonstrations.
