@@ -55,7 +55,7 @@ def variation(
     >>> low_or_high = ["low" if height < 0.3 else "high" for height in heights]
     >>> figure = pdmp.plot.variation(demos, low_or_high)
     """
-    own: str = kind or getattr(demos, "kind", "discrete")
+    own = str(kind or getattr(demos, "kind", "discrete"))
     demos = list(demos.values() if isinstance(demos, Mapping) else demos)
     if not demos:
         raise ValueError("demos is empty: pass at least one demonstration")
