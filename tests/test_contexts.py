@@ -260,6 +260,26 @@ def test_contexts_far_away_are_flagged() -> None:
     assert "extrapolated by 2.00 of the demonstrated range of contexts" in repr(found)
 
 
+def test_band_widens_gradually_beyond_the_contexts() -> None:
+    """It is narrow one and seven per cent of the range beyond contexts that say all."""
+    rng = np.random.default_rng(5)
+    heights = np.linspace(0.2, 0.7, 8)
+    movements = [bent(h) + 0.002 * rng.normal(size=bent(h).shape) for h in heights]
+    model = pdmp.fit(movements, dt=0.02, contexts=heights[:, None])
+
+    def half_width(height: float) -> float:
+        lower, upper = model.band([height], dt=0.02)
+        return float((upper - lower).max() / 2)
+
+    border = half_width(0.2)
+    assert half_width(0.2 - 1e-9) < 1.001 * border
+    assert half_width(0.195) < 1.5 * border
+    assert half_width(0.165) < 4 * border
+    lower, upper = model.band([0.165], dt=0.02)
+    assert np.mean((lower <= bent(0.165)) & (bent(0.165) <= upper)) > 0.9
+    assert half_width(-0.3) > 10 * border
+
+
 def test_process_returns_to_its_mean_far_outside() -> None:
     """Far outside, the Gaussian process returns to its mean, with its full variance."""
     model = curved(np.linspace(0, 1, 12), map="gp")

@@ -15,6 +15,8 @@ from matplotlib.figure import Figure
 import pdmp
 from pdmp import plot
 from pdmp.evaluation import Evaluation, over_styles
+from pdmp.plot.canvas import MAX_LABEL
+from pdmp.preprocessing import Cycles
 from synthetic import loops, reaches
 
 
@@ -87,10 +89,60 @@ def test_demonstrations_have_the_dofs_of_the_model(
         plot.demonstrations(model, [other] * model.n_demos)
 
 
+@pytest.mark.parametrize(("units", "aspect"), [(["m", "m"], 1.0), (["mm", "rad"], "auto")])
+def test_a_path_has_one_scale_if_the_units_agree(units: list[str], aspect: object) -> None:
+    """Millimetres and radians at one scale are a line without height."""
+    demos = [pdmp.Demonstration(demo.position, dt=0.01, units=units) for demo in reaches()]
+    model = pdmp.fit(demos)
+    for figure in (
+        plot.demonstrations(model, demos),
+        plot.fan(model, model.conditions(0), model.conditions(4)),
+    ):
+        assert figure.axes[0].get_aspect() == aspect
+
+
+@pytest.mark.parametrize("n_dofs", [2, 3, 5])
+def test_long_labels_are_inside_the_figure_and_apart(n_dofs: int) -> None:
+    """Long names take several lines, broken between words, and never within a unit."""
+    names = ["shoulder_pan_joint", "elbow_flexion_joint_left", "LEFT-WRIST-PITCH"][:n_dofs]
+    names += ["observation.state.hand", "averyveryverylongname"][: n_dofs - len(names)]
+    position = reaches()[0].position[:, [0, 1, 0, 1, 0][:n_dofs]]
+    demo = pdmp.Demonstration(position, dt=0.01, names=names, units=["m/s.kg"] * n_dofs)
+    model = pdmp.fit([demo])
+    # At a low resolution, letters are wider.
+    with rc_context({"figure.dpi": 80}):
+        figures = [
+            plot.demonstrations(model, [demo]),
+            plot.fan(model, model.conditions(0), model.conditions(0)),
+            plot.variation([demo]),
+            plot.motion(model.rollout()),
+        ]
+    for figure in figures:
+        figure.savefig(BytesIO())
+        drawn = [axes for axes in figure.axes if axes.lines]
+        for axes in drawn:
+            lines = axes.get_ylabel().split("\n")
+            assert max(map(len, lines)) <= MAX_LABEL
+            assert "".join(lines).replace(" ", "").count("[m/s.kg") == 1
+        boxes = [axes.yaxis.label.get_window_extent() for axes in drawn]
+        assert all(box.y0 >= 0 and box.y1 <= figure.bbox.height for box in boxes)
+        apart = [not a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k]]
+        assert all(apart)
+
+
 def test_singular_values_state_the_number_of_styles(model: pdmp.Model) -> None:
     """The title has J and the number of singular values."""
     (axes,) = plot.singular_values(model).axes
     assert axes.get_title().startswith("J = 2 of 5: ")
+
+
+@pytest.mark.parametrize("n_demos", [1, 5])
+def test_the_legend_of_singular_values_is_beside_the_bars(n_demos: int) -> None:
+    """A single bar leaves no room for a legend in its panel."""
+    figure = plot.singular_values(pdmp.fit(reaches()[:n_demos]))
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    assert not legend.get_window_extent().overlaps(figure.axes[0].get_window_extent())
 
 
 def test_styles_are_labelled(model: pdmp.Model) -> None:
@@ -102,6 +154,32 @@ def test_styles_are_labelled(model: pdmp.Model) -> None:
 def test_styles_show_the_context(model: pdmp.Model) -> None:
     """Without labels, a context of one number colours the points."""
     assert "context" in labels_of(plot.styles(model))
+    heights = [0.1, 0.2, 0.3, 0.5, 0.4]
+    named = pdmp.fit(reaches(), contexts={"height": heights})
+    assert "height" in labels_of(plot.styles(named))
+
+
+def test_a_single_demonstration_has_its_index_and_context() -> None:
+    """Neither demonstrations below 0 nor contexts around the only one are on an axis."""
+    figure = plot.styles(pdmp.fit(reaches()[:1], contexts={"height": [0.25]}))
+    figure.canvas.draw()
+    styles, bar = figure.axes
+    assert styles.get_ylim() == (-0.5, 0.5)
+    assert [tick for tick in styles.get_yticks() if abs(tick) <= 0.5] == [0]
+    assert [text.get_text() for text in bar.get_yticklabels()] == ["0.25"]
+
+
+def test_styles_that_vary_little_have_legible_ticks() -> None:
+    """Labels with many digits do not overlap."""
+    demos = [demo.position + 0.0 for demo in reaches()]
+    mean = np.mean([np.resize(demo, demos[0].shape) for demo in demos], axis=0)
+    almost_equal = [mean + 3e-3 * (np.resize(demo, mean.shape) - mean) for demo in demos]
+    figure = plot.styles(pdmp.fit(almost_equal, dt=0.01, n_styles=2))
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    boxes = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
+    assert max(len(text.get_text()) for text in axes.get_xticklabels()) >= 6
+    assert all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:], strict=False))
 
 
 @pytest.mark.parametrize("n_styles", [1, 2, 4])
@@ -159,10 +237,26 @@ def test_prediction_error_is_drawn_over_the_styles(evaluation: Evaluation) -> No
     """Each reach has a panel: mean and deviation per J, and the mean demonstration's level."""
     figure = plot.prediction_error(evaluation, unit="m")
     assert [axes.get_title() for axes in figure.axes] == ["interpolation", "extrapolation"]
-    assert labels_of(figure) == {"number of style parameters J", "E [m²]", ""}
+    label = "mean squared error E [m²]"
+    assert labels_of(figure) == {"number of style parameters J", label, ""}
+    # The unit is that of the demonstrations.
+    assert labels_of(plot.prediction_error(evaluation)) == labels_of(figure)
     for axes in figure.axes:
         (curve,) = axes.containers
         assert curve.lines[0].get_xdata().tolist() == [1, 2]
+
+
+def test_small_prediction_errors_are_legible_beside_large_ones() -> None:
+    """Errors that differ by orders of magnitude are drawn on a logarithmic axis."""
+    heights = [0.1, 0.2, 0.3, 0.4, 0.5]
+    t = np.linspace(0, 1, 100)
+    demos = [np.column_stack([t**2 * (3 - 2 * t), h * np.sin(np.pi * t) ** 2]) for h in heights]
+    curve = pdmp.evaluate(demos, contexts=heights, dt=0.01, predictors=over_styles(2))
+    figure = plot.prediction_error(curve)
+    smallest = min(curve.summary(name).error for name in curve.scores)
+    for axes in figure.axes:
+        assert axes.get_yscale() == "log"
+        assert 0 < axes.get_ylim()[0] < smallest
 
 
 def test_prediction_error_needs_numbers_of_styles() -> None:
@@ -179,6 +273,9 @@ def test_held_out_movements_have_a_column_per_reach(evaluation: Evaluation) -> N
     assert len(figure.axes) == 4
     for axes in figure.axes:
         assert (len(axes.lines), len(axes.collections)) == (2, 1)
+        # An exact prediction does not cover the recording.
+        recording, predicted = axes.lines
+        assert recording.get_linewidth() > 2 * predicted.get_linewidth()
 
 
 def test_given_axes_are_drawn_into(model: pdmp.Model) -> None:
@@ -388,6 +485,9 @@ def test_variation_is_mean_and_deviation_of_each_group() -> None:
 
 def test_variation_of_cycles_ends_where_it_begins() -> None:
     """A cycle has no sample at its end, which is its beginning."""
+    cycles = Cycles(loops(), [], [], [], np.zeros((0, 2)), [])  # type: ignore[arg-type]
+    assert labels_of(plot.variation(cycles)) >= {"cycle [%]"}
+    assert labels_of(plot.variation(cycles, kind="discrete")) >= {"movement [%]"}
     figure = plot.variation(loops(), kind="rhythmic")
     for axes in figure.axes:
         mean = axes.lines[-1].get_ydata()

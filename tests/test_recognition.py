@@ -286,6 +286,39 @@ def test_a_model_file_keeps_the_prior(model, demos, prior, tmp_path):
     assert path.read_bytes() == data
 
 
+def test_a_prior_needs_the_demonstrations_of_the_fit(model, demos):
+    """Another order or unit is named with its numbers; single precision and blocks are the same."""
+    with pytest.raises(ValueError, match=r"demo 0: .* instead of .*of the fit, in their order"):
+        model.prior(demos[::-1])
+    for factor in (-2.0, 57.3):
+        scaled = [pdmp.Demonstration(factor * demo.position, time=demo.time) for demo in demos]
+        with pytest.raises(ValueError, match=r"demo 0: not that of the fit .*goal\["):
+            model.prior(scaled)
+    rounded = [
+        pdmp.Demonstration(demo.position.astype(np.float32), time=demo.time.astype(np.float32))
+        for demo in demos
+    ]
+    np.testing.assert_array_equal(model.prior(rounded).parameters, model.prior(demos).parameters)
+    in_blocks = pdmp.fit(lambda: [demos[:5], demos[5:]])
+    in_blocks.recogniser(in_blocks.prior(demos))
+
+
+def test_a_prior_belongs_to_its_model(model, demos, prior, tmp_path):
+    """A model of the same dimensions refuses it, also after a pickle or from a file."""
+    mirrored = [pdmp.Demonstration(-2 * demo.position, time=demo.time) for demo in demos]
+    other = pdmp.fit(mirrored, n_styles=model.n_styles)
+    path = tmp_path / "reach.safetensors"
+    model.save(path, prior=prior)
+    for same in (prior, pickle.loads(pickle.dumps(prior)), pdmp.Prior.load(path)):
+        with pytest.raises(ValueError, match="is of another model: their demonstrations differ"):
+            other.recogniser(same)
+        with pytest.raises(ValueError, match="another model"):
+            other.save(tmp_path / "other.safetensors", prior=same)
+        for own in (model, pdmp.load(path), pickle.loads(pickle.dumps(model))):
+            own.recogniser(same)
+    assert not (tmp_path / "other.safetensors").exists()
+
+
 def test_groups_of_people_are_names(model, demos):
     """Groups are any names, at least two."""
     prior = model.prior(demos, groups=["a", "b", "c"] * 4)

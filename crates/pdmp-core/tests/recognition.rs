@@ -9,9 +9,9 @@ mod counting;
 use common::*;
 use counting::{Random, allocations};
 use pdmp_core::inference::{Prior, Recogniser, Timing};
-use pdmp_core::learning::learn_prior;
+use pdmp_core::learning::{Blocks, Truncation, fit_blocks, learn_prior};
 use pdmp_core::numerics::Threads;
-use pdmp_core::{Demonstration, Kind, Model};
+use pdmp_core::{Demonstration, Error, Kind, Model, Sampling};
 
 fn recordings() -> Vec<Demonstration> {
     (0..12).map(|k| reach(0.05 * f64::from(k), 0.8 + 0.05 * f64::from((7 * k) % 12), 0.01)).collect()
@@ -225,6 +225,106 @@ fn bad_observations_are_refused() {
         assert!(Recogniser::new(&model, &prior, Timing { starts: timing, duration: None }).is_err());
     }
     assert!(Recogniser::new(&model, &prior, Timing { duration: Some(0.0), ..Timing::default() }).is_err());
+}
+
+/// Positions with every number changed.
+fn changed(demos: &[Demonstration], change: impl Fn(f64) -> f64) -> Vec<Demonstration> {
+    let of = |demo: &Demonstration| Demonstration::new(demo.position().mapv(&change), demo.sampling().clone()).unwrap();
+    demos.iter().map(of).collect()
+}
+
+/// Demonstrations in another order, unit or with another clock are refused, with the index of the first, its quantity and
+/// both numbers; those of the fit are accepted as single precision, with four digits, and without a clock.
+#[test]
+fn a_prior_is_learnt_from_the_demonstrations_of_the_fit() {
+    // Noise differs from movement to movement, so that starts and goals do; without it, reaches have one start and one goal.
+    let mut random = Random(5);
+    let noisy = changed(&recordings(), |y| y).into_iter().map(|demo| {
+        let position = demo.position().mapv(|y| y + 0.002 * random.between(-1.0, 1.0));
+        Demonstration::new(position, demo.sampling().clone()).unwrap()
+    });
+    let (noisy, exact) = (noisy.collect::<Vec<_>>(), changed(&recordings(), |y| y));
+    let rhythmic: Vec<_> = (0..6).map(|k| cycle(0.06 * f64::from(k), 1.0 + 0.02 * f64::from(k), 120)).collect();
+    let unclocked = |demos: &[Demonstration]| -> Vec<_> {
+        demos.iter().map(|demo| Demonstration::new(demo.position().to_owned(), Sampling::Unknown).unwrap()).collect()
+    };
+    for (demos, kind) in [(noisy, Kind::Discrete), (exact, Kind::Discrete), (rhythmic, Kind::Rhythmic)] {
+        let model = learn(&demos, &options(kind));
+        let error = |demos: &[Demonstration]| learn_prior(&model, demos, None, Threads::ONE).unwrap_err();
+        let mut reversed = demos.clone();
+        reversed.reverse();
+        let mut twice = demos.clone();
+        twice[3] = demos[0].clone();
+        let slower = demos.iter().map(|demo| {
+            let Sampling::Uniform { dt } = demo.sampling() else { unreachable!() };
+            Demonstration::new(demo.position().to_owned(), Sampling::Uniform { dt: 1.02 * dt }).unwrap()
+        });
+        let mut swapped = unclocked(&demos);
+        swapped.swap(1, 4);
+        for (given, first) in [
+            (reversed, None),
+            (twice, Some(3)),
+            (slower.collect(), Some(0)),
+            (swapped, None),
+            (changed(&demos, |y| -2.0 * y), Some(0)),
+            (changed(&demos, f64::to_degrees), Some(0)),
+            (changed(&demos, |y| y + 0.01), Some(0)),
+        ] {
+            let Error::Demo { demo, source } = error(&given) else { panic!("{}", error(&given)) };
+            assert!(first.is_none_or(|first| demo == first), "{demo}: {source}");
+            let Error::OtherDemonstration(ref found) = *source else { panic!("{source}") };
+            assert!(["duration", "start", "goal", "anchor", "style"].contains(&found.name), "{source}");
+            assert!((found.found - found.expected).abs() > 1e-3 * found.expected.abs(), "{source}");
+        }
+        let named = demos[0].clone().with_units(vec!["deg".to_string(); model.n_dofs()]).unwrap();
+        let renamed: Vec<_> = std::iter::once(named).chain(demos[1..].iter().cloned()).collect();
+        assert!(error(&renamed).to_string().contains("units differ"), "{}", error(&renamed));
+
+        let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
+        let digits = |y: f64| (1e4 * y).round() / 1e4;
+        for same in [changed(&demos, |y| f64::from(y as f32)), changed(&demos, digits), unclocked(&demos)] {
+            let again = learn_prior(&model, &same, None, Threads::ONE).unwrap();
+            assert_eq!(again.parameters(), prior.parameters());
+        }
+        let loaded = Model::from_bytes(&model.to_bytes().unwrap()).unwrap();
+        assert_eq!(learn_prior(&loaded, &demos, None, Threads::ONE).unwrap(), prior);
+    }
+}
+
+/// The prior of a model of the same kind, styles and degrees of freedom is refused, also in a given context; those of the model
+/// as it was saved, and of a fit of the same demonstrations in blocks, are accepted.
+#[test]
+fn a_prior_of_another_model_is_refused() {
+    let demos = recordings();
+    let (model, prior) = learnt(&demos, Kind::Discrete);
+    let mirrored: Vec<_> = changed(&demos, |y| -2.0 * y)
+        .into_iter()
+        .zip(&demos)
+        .map(|(mirrored, demo)| mirrored.with_context(demo.context().unwrap().to_vec()).unwrap())
+        .collect();
+    let fewer = learn(&demos[..11], &options(Kind::Discrete).n_styles(Truncation::Rank(model.n_styles())));
+    let mirrored = learn(&mirrored, &options(Kind::Discrete).n_styles(Truncation::Rank(model.n_styles())));
+    let given = prior.given(&model, &[0.3]).unwrap();
+    for other in [&fewer, &mirrored] {
+        for prior in [&prior, &given] {
+            let errors = [
+                Recogniser::new(other, prior, Timing::default()).unwrap_err(),
+                prior.to_bytes(other).unwrap_err(),
+                prior.given(other, &[0.3]).unwrap_err(),
+            ];
+            assert!(errors.iter().all(|error| error.to_string().contains("prior is of another model")), "{errors:?}");
+        }
+    }
+    let bytes = prior.to_bytes(&model).unwrap();
+    let (loaded, read) = (Model::from_bytes(&bytes).unwrap(), Prior::from_bytes(&bytes).unwrap());
+    let mut blocks = || -> Blocks<'_> { Box::new(demos.chunks(5).map(|block| Ok(block.to_vec()))) };
+    let streamed = fit_blocks(&mut blocks, &options(Kind::Discrete), &mut |_, _| Ok(())).unwrap();
+    assert!(learn_prior(&streamed, &demos, None, Threads::ONE).is_ok());
+    for model in [&model, &loaded, &streamed] {
+        for prior in [&prior, &read, &given] {
+            Recogniser::new(model, prior, Timing::default()).unwrap();
+        }
+    }
 }
 
 /// In a given context, a movement is known before it begins, and its prior is another one than without.

@@ -33,15 +33,20 @@ pub(crate) struct Prior(pub(crate) pdmp_core::inference::Prior);
 impl Prior {
     /// Rebuilds a pickled prior.
     #[staticmethod]
+    #[pyo3(signature = (rhythmic, mixture, residual, deviations, demonstrated=None))]
     fn _of(
         rhythmic: bool,
         mixture: &Bound<'_, PyAny>,
         residual: &Bound<'_, PyAny>,
         deviations: Option<&Bound<'_, PyAny>>,
+        demonstrated: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let kind = if rhythmic { pdmp_core::Kind::Rhythmic } else { pdmp_core::Kind::Discrete };
         let residual = vector("residual", residual)?;
-        let prior = pdmp_core::inference::Prior::new(kind, unpickled(mixture)?, residual).map_err(raise)?;
+        let mut prior = pdmp_core::inference::Prior::new(kind, unpickled(mixture)?, residual).map_err(raise)?;
+        if let Some(demonstrated) = demonstrated {
+            prior = prior.with_demonstrated(matrix("demonstrated", "(M, K + 1)", demonstrated)?).map_err(raise)?;
+        }
         match deviations {
             Some(deviations) => prior.with_deviations(unpickled(deviations)?).map(Self).map_err(raise),
             None => Ok(Self(prior)),
@@ -52,7 +57,8 @@ impl Prior {
         let prior = &self.0;
         let deviations = prior.deviations().map(|deviations| pickled(py, deviations)).transpose()?;
         let rhythmic = prior.kind() == pdmp_core::Kind::Rhythmic;
-        let arguments = (rhythmic, pickled(py, prior.mixture())?, self.residual(py), deviations);
+        let demonstrated = prior.demonstrated().map(|demonstrated| numpy::PyArray2::from_array(py, &demonstrated));
+        let arguments = (rhythmic, pickled(py, prior.mixture())?, self.residual(py), deviations, demonstrated);
         Ok((py.get_type::<Self>().getattr("_of")?, arguments.into_pyobject(py)?))
     }
 

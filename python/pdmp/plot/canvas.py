@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from math import ceil
 from os import PathLike
 from pathlib import Path
-from textwrap import fill
+from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 # Palette of Okabe and Ito, ordered by contrast on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-MAX_LABEL = 20
-"""Largest number of characters of an axis label in one line."""
+MAX_LABEL = 14
+"""Largest number of characters of an axis label in one line; 16 are as long as a low panel."""
 BLUE, ORANGE, GREY = PALETTE[0], PALETTE[1], "#B8B8B8"
 Place: TypeAlias = Literal["outside lower center", "outside right upper"]
 DPI = 150
@@ -159,9 +160,19 @@ def label_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
+class _LabelWrapper(TextWrapper):
+    """Breaks labels between words, which underscores, points and hyphens end too outside units."""
+
+    wordsep_re = re.compile(r"(\s+|(?<=[_.-])(?=\w)(?![^\[]*\]))")
+
+
 def dof_labels(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Returns the names of the degrees of freedom with their units; long ones take two lines."""
-    return [fill(label, MAX_LABEL) for label in map(join_label, names, units)]
+    """Returns the names of the degrees of freedom with their units; long ones take several lines.
+
+    A layout makes no room above and below a panel for a label that is longer than the panel.
+    """
+    wrapper = _LabelWrapper(width=MAX_LABEL)
+    return [wrapper.fill(label) for label in map(join_label, names, units)]
 
 
 def movement_panels(
@@ -169,8 +180,9 @@ def movement_panels(
 ) -> list[list[Axes]]:
     """Returns a column of panels for `draw_movement` per title.
 
-    With two degrees of freedom, the first panel is for the path. The others are for each degree of
-    freedom over time, in a grid if one column has more than four.
+    With two degrees of freedom, the first panel is for the path, at one scale if they have the same
+    unit. The others are for each degree of freedom over time, in a grid if one column has more than
+    four.
     """
     labels = dof_labels(model.coordinate_names, model.coordinate_units)
     if len(titles) == 1 and len(labels) > 4:
@@ -186,7 +198,8 @@ def movement_panels(
     for column, title in zip(columns, titles, strict=True):
         if has_path:
             label_axes(column[0], *labels)
-            column[0].set_aspect("equal", adjustable="datalim")
+            if len(set(model.coordinate_units)) == 1:
+                column[0].set_aspect("equal", adjustable="datalim")
         for axes, label in zip(column[has_path:], labels, strict=True):
             label_axes(axes, "time [s]", label)
         column[0].set_title(title)

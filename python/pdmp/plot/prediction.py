@@ -27,22 +27,26 @@ if TYPE_CHECKING:
     from pdmp.evaluation import Evaluation
 
 MAX_DOFS = 6
+MAX_LINEAR_RATIO = 20.0
+"""Largest ratio of mean errors that a linear axis shows."""
 
 
 def prediction_error(
     evaluation: Evaluation, *, unit: str = "", ax: Axes | ArrayLike | None = None
 ) -> Figure:
-    """Draws E over the number of style parameters J, with a panel per reach.
+    """Draws the mean squared error E over the number of style parameters J, with a panel per reach.
 
-    Every `PDMP` with `n_styles` among the predictors is a point: mean and standard deviation over
-    the folds, as in Fig. 4a of the paper. Other predictors are horizontal lines.
+    E = (1/T) Σ‖ŷ(t) − y(t)‖², over normalised time. Every `PDMP` with `n_styles` among the
+    predictors is a point: mean and standard deviation over the folds, as in Fig. 4a of the paper.
+    Other predictors are horizontal lines. The axis of E is logarithmic if the largest mean is more
+    than twenty times the smallest.
 
     Parameters
     ----------
     evaluation : Evaluation
         Result of `pdmp.evaluate`, such as for the predictors of `evaluation.over_styles`.
     unit : str
-        Unit of the positions, such as "rad".
+        Unit of the positions, such as "rad", instead of that of the demonstrations.
     ax : matplotlib.axes.Axes or array of Axes, optional
         The panels, or one in whose place they are drawn; by default those of a new figure.
 
@@ -89,8 +93,19 @@ def prediction_error(
             axes.axhline(level, color=color, linestyle="--", linewidth=1, label=name)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         label_axes(axes, "number of style parameters J", "", reach)
-    panels[0].set_ylim(bottom=0)
-    panels[0].set_ylabel(join_label("E", unit and f"{unit}²"))
+    means = [evaluation.summary(name, reach) for name in evaluation.scores for reach in reaches]
+    errors = [mean.error for mean in means]
+    smallest = min((error for error in errors if error > 0), default=0.0)
+    if max(errors) > MAX_LINEAR_RATIO * smallest > 0:
+        for axes in panels:
+            axes.set_yscale("log")
+        # The deviation may exceed the mean.
+        panels[0].set_ylim(bottom=smallest / 3)
+    else:
+        panels[0].set_ylim(bottom=0)
+    units = set(evaluation.recordings.units)
+    unit = unit or (units.pop() if len(units) == 1 else "")
+    panels[0].set_ylabel(join_label("mean squared error E", unit and f"{unit}²"))
     legend(panels[0])
     return figure_of(panels)
 
@@ -146,13 +161,13 @@ def held_out(
         traces = [recordings.relative(forecast.position, y) for y in recordings.sampled[repeated]]
         for axes, dof in zip(column, dofs, strict=True):
             for trace in traces:
-                axes.plot(phase, trace[:, dof], color=GREY, linewidth=1.5, label="held out")
+                axes.plot(phase, trace[:, dof], color=GREY, linewidth=3, label="held out")
             mean = predicted[:, dof]
             if forecast.variance is not None:
                 half = HALF_WIDTH * np.sqrt(forecast.variance[:, dof])
                 band: dict[str, Any] = {"color": line_color(0), "alpha": 0.15, "linewidth": 0}
                 axes.fill_between(phase, mean - half, mean + half, label=f"{BAND:.0%} band", **band)
-            axes.plot(phase, mean, color=line_color(0), linewidth=1.2, label="predicted")
+            axes.plot(phase, mean, color=line_color(0), linewidth=0.9, label="predicted")
             label_axes(axes, "", labels[dof])
         values = (v if isinstance(v, str) else f"{v:.3g}" for v in context)
         column[0].set_title(f"{reach}, context {' '.join(values)}")

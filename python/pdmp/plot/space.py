@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
+MAX_INTERVALS = 5
+"""Largest number of intervals between the ticks of a style parameter."""
+
 
 def singular_values(model: Model, *, ax: Axes | None = None) -> Figure:
     """Draws the share of each singular value in their sum, and the number J of styles.
@@ -58,7 +61,7 @@ def singular_values(model: Model, *, ax: Axes | None = None) -> Figure:
     truncated = f"{100 * model.truncation_error:.2g} % of the targets' RMS left out"
     title = f"J = {n_kept} of {model.n_demos}: {truncated}"
     label_axes(axes, "singular value, of those computed", "share of their sum [%]", title)
-    axes.legend(frameon=False, loc="center right")
+    legend(axes)
     return figure_of([axes])
 
 
@@ -68,7 +71,7 @@ def styles(
     """Draws the style of each demonstration, in the planes of the first three style parameters.
 
     Without labels, a context of a single label labels the demonstrations, and a context of a single
-    number is their colour.
+    number is their colour. A single style parameter is drawn beside the index of the demonstration.
 
     Parameters
     ----------
@@ -93,7 +96,6 @@ def styles(
     context = model.contexts if labels is None else None
     if isinstance(context, list) and len(context[0]) == 1:
         labels = [str(value) for (value,) in context]
-    # With a single style parameter, the second axis is the index of the demonstration.
     points = np.column_stack([model.styles, np.arange(model.n_demos)])
     names = [f"style $s_{{{j + 1}}}$" for j in range(model.n_styles)] + ["demonstration"]
     others = [1, 2] if model.n_styles > 2 else [1]
@@ -103,6 +105,8 @@ def styles(
         values = context[:, 0]
     panels = draw_panels(ax, len(others), len(others), (1.0 + 4.5 * len(others), 4.2))
     figure = figure_of(panels)
+    from matplotlib.ticker import MaxNLocator
+
     for axes, other in zip(panels, others, strict=True):
         for k, group in enumerate(groups):
             members = [m for m in range(model.n_demos) if labels is None or labels[m] == group]
@@ -116,8 +120,15 @@ def styles(
                 label=group,
             )
         label_axes(axes, names[0], names[other])
+        # Numbers that vary little have many digits.
+        axes.xaxis.set_major_locator(MaxNLocator(MAX_INTERVALS, steps=[1, 2, 2.5, 5, 10]))
+        if other == model.n_styles:
+            axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+            axes.set_ylim(-0.5, model.n_demos - 0.5)
     if values is not None:
-        figure.colorbar(dots, ax=panels, label="context")
+        ticks = None if np.ptp(values) > 0 else values[:1]
+        (name,) = model.context_names or [""]
+        figure.colorbar(dots, ax=panels, label=name or "context", ticks=ticks)
     elif labels is not None:
         legend(panels[0], "outside right upper")
     return figure

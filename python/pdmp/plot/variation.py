@@ -22,7 +22,7 @@ def variation(
     demos: Sequence[Demonstration] | Mapping[str, Demonstration],
     labels: Sequence[str] | None = None,
     *,
-    kind: Literal["discrete", "rhythmic"] = "discrete",
+    kind: Literal["discrete", "rhythmic"] | None = None,
     ax: Axes | ArrayLike | None = None,
 ) -> Figure:
     """Draws mean ± standard deviation of each group, over the percentage of movement or cycle.
@@ -36,8 +36,9 @@ def variation(
         `pdmp.preprocessing.cycles`.
     labels : sequence of str, optional
         Group of each demonstration: a person, a condition.
-    kind : {"discrete", "rhythmic"}
-        A rhythmic demonstration is one cycle, which ends where it begins.
+    kind : {"discrete", "rhythmic"}, optional
+        A rhythmic demonstration is one cycle, which ends where it begins; by default that of the
+        result of `pdmp.preprocessing.cycles`, otherwise a discrete one.
     ax : matplotlib.axes.Axes or array of Axes, optional
         The panels, or one in whose place they are drawn; by default those of a new figure.
 
@@ -54,6 +55,7 @@ def variation(
     >>> low_or_high = ["low" if height < 0.3 else "high" for height in heights]
     >>> figure = pdmp.plot.variation(demos, low_or_high)
     """
+    own = str(kind or getattr(demos, "kind", "discrete"))
     demos = list(demos.values() if isinstance(demos, Mapping) else demos)
     if not demos:
         raise ValueError("demos is empty: pass at least one demonstration")
@@ -65,9 +67,9 @@ def variation(
     for m, demo in enumerate(demos):
         if demo.n_coordinates != n:
             raise ValueError(f"demo {m} has {demo.n_coordinates} columns, expected {n} as demo 0")
-    traces = np.stack([_over_percent(demo, kind) for demo in demos])
+    traces = np.stack([_over_percent(demo, own) for demo in demos])
     names = demos[0].names or [f"y{d}" for d in range(n)]
-    x = "cycle [%]" if kind == "rhythmic" else "movement [%]"
+    x = "cycle [%]" if own == "rhythmic" else "movement [%]"
     panels = grid_panels(dof_labels(names, demos[0].units or [""] * n), x, ax)
     groups = ["mean ± SD"] if labels is None else list(dict.fromkeys(labels))
     if labels is None:

@@ -32,7 +32,7 @@ use encoding::{Encoder, to_numbers};
 use kriging::Kriging;
 use model_selection::{KrigingModel, SelectedMap, StackedLine, select};
 use principal_axes::PrincipalAxes;
-use stacking::MemberWeight;
+use stacking::{MemberWeight, dispersion_beyond};
 use training_data::GroupedData;
 
 use crate::demonstration::ContextValue;
@@ -80,6 +80,8 @@ pub struct ContextMap {
     line: Option<Predictor>,
     /// Mean over the contexts (P,).
     mean: Array1<f64>,
+    /// Weights of the process, the line and the mean in the variance beyond the demonstrated contexts.
+    dispersion: [f64; 3],
     /// Covariance (P, P) of the noise of the contexts' means; `None` without degrees of freedom.
     noise: Option<Array2<f64>>,
     /// Covariance (P, P) that one movement adds to it: the part of the covariance within contexts that means average out.
@@ -205,8 +207,15 @@ impl ContextMap {
                 (Some(innovations.t().dot(&innovations) / n as f64), n)
             }
         };
+        let mean = data.means.mean_axis(Axis(0)).unwrap_or_default();
+        let error = |kind: ContextMapKind| errors.iter().find(|(own, _)| *own == kind).map(|(_, error)| *error);
+        // The mean of the other contexts, from which one is n/(n − 1) times as far as from that of all.
+        let n = data.means.nrows().max(2) as f64;
+        let of_mean = (&data.means - &mean).mapv(|deviation| deviation * deviation).sum() * n / (n - 1.0).powi(2);
+        let of_members = [ContextMapKind::Gp, ContextMapKind::Linear].map(|kind| error(kind).unwrap_or(of_mean));
         Self {
-            mean: data.means.mean_axis(Axis(0)).unwrap_or_default(),
+            dispersion: dispersion_beyond([of_members[0], of_members[1], of_mean]),
+            mean,
             within: data.within.map(|(within, _)| within * (1.0 - data.averaged_share)),
             columns: data.columns,
             names: Vec::new(),
@@ -328,7 +337,7 @@ impl ContextMap {
         let (Some(line), Some((_, weights))) = (&self.line, &self.parameters.line) else {
             return (process, Vec::new());
         };
-        let weights = weights.at(extrapolation.iter().fold(0.0, |max, distance| distance.max(max)));
+        let weights = weights.at(extrapolation.iter().fold(0.0, |max, distance| distance.max(max)), self.dispersion);
         let members = [process, line.mean(features), self.mean.clone()];
         let mut combined = Array1::zeros(self.mean.len());
         for (member, MemberWeight { mean, .. }) in members.iter().zip(weights) {

@@ -93,18 +93,34 @@ impl StackingWeights {
         Self { interpolation: shrunk(true), extrapolation: shrunk(false) }
     }
 
-    /// Computes the weights of the process, the line and the mean for an extrapolation in units of the demonstrated range.
-    ///
-    /// The dispersion weights become equal in extrapolation, where no leave-one-out error supports one member.
-    pub(super) fn at(&self, extrapolation: f64) -> [MemberWeight; 3] {
+    /// Computes the weights of the process, the line and the mean for an extrapolation in units of the demonstrated range, with
+    /// their weights in the variance beyond the demonstrated contexts, of [`dispersion_beyond`].
+    pub(super) fn at(&self, extrapolation: f64, dispersion: [f64; 3]) -> [MemberWeight; 3] {
         let share = (extrapolation / TRANSITION).min(1.0);
         let with_mean = |[g, l]: Weights| [g, l, (1.0 - g - l).max(0.0)];
         let [within, beyond] = [with_mean(self.interpolation), with_mean(self.extrapolation)];
         [0, 1, 2].map(|k| {
             let mean = within[k] + share * (beyond[k] - within[k]);
-            MemberWeight { mean, dispersion: mean + share * (1.0 / 3.0 - mean) }
+            MemberWeight { mean, dispersion: mean + share * (dispersion[k] - mean) }
         })
     }
+}
+
+/// Computes the weights of the process, the line and the mean in the variance beyond the demonstrated contexts, which are
+/// inversely proportional to their mean squared leave-one-out errors.
+///
+/// A member that errs much within the contexts is hardly plausible just beyond them. With equal weights, bands of movements
+/// that their contexts determine are thirty times as wide a tenth of the range beyond the contexts as within. On the sets of
+/// recordings of `docs/report.md`, a mean of 93 % of the held-out positions beyond the contexts lie in their 90 % band, 94 %
+/// with equal weights, whose bands are a tenth wider.
+pub(super) fn dispersion_beyond(errors: [f64; 3]) -> [f64; 3] {
+    let errors = errors.map(|error| error.max(f64::MIN_POSITIVE));
+    let least = errors.iter().fold(f64::INFINITY, |least, error| error.min(least));
+    if !least.is_finite() {
+        return [1.0 / 3.0; 3];
+    }
+    let precisions = errors.map(|error| least / error);
+    precisions.map(|precision| precision / precisions.iter().sum::<f64>())
 }
 
 #[cfg(test)]
@@ -132,6 +148,20 @@ mod tests {
         let opposite = &y * 2.0;
         let neither = StackingWeights::fit(&y, &opposite, &opposite);
         assert!(neither.extrapolation[0] + neither.extrapolation[1] < 0.2, "{neither:?}");
+    }
+
+    /// Weights in the variance are inversely proportional to the errors; a member without a prediction has none.
+    #[test]
+    fn accurate_members_have_the_weight_beyond_the_contexts() {
+        assert_eq!(dispersion_beyond([1.0, 4.0, 4.0]), [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0]);
+        assert_eq!(dispersion_beyond([2.0, f64::INFINITY, f64::INFINITY]), [1.0, 0.0, 0.0]);
+        for equal in [0.0, 1e300, f64::INFINITY] {
+            assert_eq!(dispersion_beyond([equal; 3]), [1.0 / 3.0; 3]);
+        }
+        let weights = StackingWeights { interpolation: [1.0, 0.0], extrapolation: [0.5, 0.5] };
+        let dispersion = |at: f64| weights.at(at, [0.5, 0.3, 0.2]).map(|weight| weight.dispersion);
+        assert_eq!(dispersion(0.0), [1.0, 0.0, 0.0]);
+        assert_eq!(dispersion(1.0), [0.5, 0.3, 0.2]);
     }
 
     proptest! {

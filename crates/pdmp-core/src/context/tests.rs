@@ -242,6 +242,34 @@ fn bands_of_few_contexts_have_their_nominal_coverage() {
     assert!((0.85..0.95).contains(&coverage), "{coverage}");
 }
 
+/// Just beyond contexts that determine the outputs, deviations are hardly larger than within, and larger than the errors; beyond
+/// contexts without effect, they are those of the outputs.
+#[test]
+fn deviations_grow_gradually_beyond_the_contexts() {
+    let curves: [fn(f64) -> f64; 4] = [|h| h, |h| 2.0 * h * h, |h| (3.0 * h).sin(), |h| (3.0 * h).tanh()];
+    for curve in curves {
+        let mut noise = white_noise(5);
+        let h: Vec<f64> = (0..9).map(|m| m as f64 / 8.0).collect();
+        let outputs = Array2::from_shape_fn((9, 1), |(m, _)| curve(h[m]) + 0.002 * noise());
+        let map = ContextMap::fit(&contexts(&h), outputs.view(), MapSelection::Auto).unwrap();
+        let deviation = |at: f64| map.predict(&[at]).unwrap().covariance.unwrap()[[0, 0]].sqrt();
+        let border = deviation(1.0);
+        assert!(deviation(1.0 + 1e-9) < 1.0001 * border);
+        for (at, most) in [(1.01, 2.0), (1.07, 6.0)] {
+            let error = (map.predict(&[at]).unwrap().mean[0] - curve(at)).abs();
+            assert!(deviation(at) < most * border, "{at}: {} at the border, {}", border, deviation(at));
+            assert!(error < 2.0 * deviation(at), "{at}: {error} above {}", deviation(at));
+        }
+        assert!(deviation(2.0) > 10.0 * border, "{border} at the border, {} far beyond", deviation(2.0));
+    }
+    let mut noise = white_noise(8);
+    let h: Vec<f64> = (0..40).map(|m| m as f64 / 39.0).collect();
+    let outputs = Array2::from_shape_fn((40, 1), |_| noise());
+    let map = ContextMap::fit(&contexts(&h), outputs.view(), MapSelection::Auto).unwrap();
+    let deviation = map.predict(&[1.05]).unwrap().covariance.unwrap()[[0, 0]].sqrt();
+    assert!((0.7..1.6).contains(&deviation), "{deviation}");
+}
+
 /// Deviations are those from the prediction by the other contexts: of a line, from one fitted to them, with a context that was
 /// repeated; of every kind, with the mean square that the map states.
 #[test]

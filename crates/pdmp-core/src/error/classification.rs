@@ -43,7 +43,8 @@ impl Error {
             | Self::Dofs { .. }
             | Self::Mixed { .. }
             | Self::Undescribed { .. }
-            | Self::StyleSize { .. } => ErrorKind::Data,
+            | Self::StyleSize { .. }
+            | Self::OtherDemonstration(_) => ErrorKind::Data,
             Self::NotFinite { .. }
             | Self::Length { .. }
             | Self::Name { .. }
@@ -97,6 +98,7 @@ impl Error {
             Self::Segments { .. } => Some("n_segments"),
             Self::Samples { .. } | Self::Dofs { .. } => Some("position"),
             Self::NoDemonstrations => Some("demos"),
+            Self::OtherDemonstration(_) => Some("demonstrations"),
             Self::Styles { .. } => Some("n_styles"),
             Self::Label { .. } | Self::NoNumber { .. } | Self::ContextNames { .. } => Some("context"),
             Self::Mixed { .. } => Some("contexts"),

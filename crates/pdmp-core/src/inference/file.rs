@@ -85,7 +85,7 @@ impl Prior {
         let has_deviations = section.shape_of(&format!("{DEVIATIONS}parameters")).is_ok();
         let deviations = has_deviations.then(|| Mixture::take(&mut section, DEVIATIONS, n_parameters)).transpose()?;
         section.close()?;
-        let prior = Self::new(model.kind(), mixture, residual).map_err(unreadable)?;
+        let prior = Self::new(model.kind(), mixture, residual).map_err(unreadable)?.of_model(&model);
         deviations.map_or(Ok(prior.clone()), |deviations| prior.with_deviations(deviations)).map_err(unreadable)
     }
 }

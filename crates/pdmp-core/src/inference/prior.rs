@@ -1,6 +1,6 @@
 //! Prior distribution of the parameters of a movement.
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 
 use super::calibration::Calibration;
 use crate::demonstration::ContextValue;
@@ -13,6 +13,8 @@ use crate::validate::{check_finite, check_length, check_matrix, check_range};
 pub(crate) const MIN_DEMOS: usize = 3;
 /// Smallest standard deviation of the logarithm of the duration: recordings of one length have none.
 pub(crate) const MIN_LOG_DEVIATION: f64 = 0.003;
+/// Largest relative difference of equal parameters of demonstrations.
+const ROUNDING: f64 = 1e-6;
 /// Share of the covariance of the demonstrations that its diagonal replaces.
 const SHRINKAGE: f64 = 0.1;
 
@@ -62,6 +64,8 @@ pub struct Prior {
     mixture: Mixture,
     /// Deviations of the demonstrations from the predictions for their contexts, if there are any.
     deviations: Option<Mixture>,
+    /// Parameters and logarithms of the durations (M, K + 1) of the demonstrations of the model, if that is known.
+    demonstrated: Option<Array2<f64>>,
 }
 
 impl Settings {
@@ -141,7 +145,38 @@ impl Prior {
         let allowed = "must lie between 1e-100 and 1e100";
         let valid = |sd: f64| (1e-100..=1e100).contains(&sd);
         residual.iter().try_for_each(|&sd| check_range("residual", sd, valid(sd), allowed))?;
-        Ok(Self { kind, n_styles: found - n_positions, residual, mixture, deviations: None })
+        Ok(Self { kind, n_styles: found - n_positions, residual, mixture, deviations: None, demonstrated: None })
+    }
+
+    /// Returns the prior as one of a model with given parameters and logarithms of the durations (M, K + 1) of the
+    /// demonstrations, which [`Prior::demonstrated`] returns. Other models then refuse it.
+    ///
+    /// ```
+    /// # use ndarray::array;
+    /// # use pdmp_core::Kind;
+    /// # use pdmp_core::inference::{Calibration, Mixture, Prior, Settings};
+    /// # let settings = Settings { bandwidth: 0.5, tempering: 1.0, correlation_time: 0.1 };
+    /// # let parameters = array![[0.1, 1.0, 0.0], [0.2, 1.1, 0.0], [0.4, 1.3, 0.1]];
+    /// # let (log_durations, calibration) = (vec![0.0, 0.1, 0.2], Calibration::NONE);
+    /// # let mixture = Mixture { parameters, log_durations, settings, calibration };
+    /// let demonstrated = array![[0.1, 1.0, 0.0, 0.0], [0.2, 1.1, 0.0, 0.1], [0.4, 1.3, 0.1, 0.2]];
+    /// let prior = Prior::new(Kind::Discrete, mixture, vec![0.01])?.with_demonstrated(demonstrated.clone())?;
+    /// assert_eq!(prior.demonstrated(), Some(demonstrated.view()));
+    /// # Ok::<(), pdmp_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Another number of columns than the prior has parameters, and one, or a number that is not finite.
+    pub fn with_demonstrated(self, demonstrated: Array2<f64>) -> Result<Self> {
+        check_matrix("demonstrated", demonstrated.view())?;
+        let expected = self.mixture.parameters.ncols() + 1;
+        check_length("demonstrated", demonstrated.ncols(), expected, "parameter, and the logarithm of the duration")?;
+        Ok(Self { demonstrated: Some(demonstrated), ..self })
+    }
+
+    /// Returns the prior as one of a model.
+    pub(crate) fn of_model(self, model: &Model) -> Self {
+        Self { demonstrated: Some(model.demonstrated().outputs(model.kind())), ..self }
     }
 
     /// Returns the prior with the deviations of the demonstrations from the predictions for their contexts, with settings
@@ -213,7 +248,8 @@ impl Prior {
             log_durations: deviations.log_durations.iter().map(|deviation| log_duration + deviation).collect(),
             ..*deviations
         };
-        Self::new(self.kind, mixture, self.residual.clone())
+        let given = Self::new(self.kind, mixture, self.residual.clone())?;
+        Ok(Self { demonstrated: self.demonstrated.clone(), ..given })
     }
 
     /// Returns the prior with other settings.
@@ -228,12 +264,18 @@ impl Prior {
     /// Checks that the prior may be one of a model.
     ///
     /// # Errors
-    /// Its kind, styles or degrees of freedom differ.
+    /// Its kind, styles, degrees of freedom or demonstrations differ.
     pub(crate) fn check_model(&self, model: &Model) -> Result<()> {
         let n_parameters = model.n_styles() + frame_size(model.kind()) * model.n_dofs();
         let same = self.kind == model.kind() && self.residual.len() == model.n_dofs();
         if !same || self.mixture.parameters.ncols() != n_parameters {
             let problem = "is of another model: its kind, styles or degrees of freedom differ";
+            return Err(Error::Argument { name: "prior", problem });
+        }
+        let own = self.demonstrated.as_ref().map(|_| model.demonstrated().outputs(model.kind()));
+        if self.demonstrated.iter().zip(&own).any(|(other, own)| !are_equal(other, own)) {
+            let problem = "is of another model: their demonstrations differ; learn a prior from the demonstrations of this \
+                           model, or load the one in its file";
             return Err(Error::Argument { name: "prior", problem });
         }
         Ok(())
@@ -290,6 +332,12 @@ impl Prior {
         self.deviations.as_ref()
     }
 
+    /// Returns the parameters and logarithms of the durations (M, K + 1) of the demonstrations of its model; `None` of a
+    /// prior that [`Prior::new`] creates, which every model of the same kind, styles and degrees of freedom accepts.
+    pub fn demonstrated(&self) -> Option<ArrayView2<'_, f64>> {
+        self.demonstrated.as_ref().map(|demonstrated| demonstrated.view())
+    }
+
     /// Computes the moments of the demonstrations. The covariance is shrunk towards its diagonal (O. Ledoit, M. Wolf,
     /// J. Multivar. Anal. 88, 2004), since it is singular with fewer demonstrations than parameters.
     ///
@@ -320,6 +368,15 @@ impl Prior {
         }
         Moments { mean: mean.to_vec(), covariance, log_mean, log_deviation: log_variance.sqrt(), slope: slope.to_vec() }
     }
+}
+
+/// Returns true if two matrices are equal but for rounding, relative to the largest number of each column.
+fn are_equal(a: &Array2<f64>, b: &Array2<f64>) -> bool {
+    let equal_columns = |(a, b): (ArrayView1<f64>, ArrayView1<f64>)| {
+        let largest = a.iter().chain(&b).fold(0.0f64, |largest, x| largest.max(x.abs()));
+        a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= ROUNDING * largest)
+    };
+    a.dim() == b.dim() && a.columns().into_iter().zip(b.columns()).all(equal_columns)
 }
 
 /// Returns the number of positions of each DoF among the parameters: goal and start, or the anchor.

@@ -1,5 +1,6 @@
 //! Prior of the parameters of a movement, with settings and bands from simulated recognition of held-out demonstrations.
 
+mod fitted;
 mod folds;
 mod recording;
 mod selection;
@@ -17,6 +18,7 @@ use crate::model::Model;
 use crate::numerics::threads::Threads;
 use crate::validate::check_length;
 
+use fitted::fitted;
 use folds::folds;
 use recording::Recording;
 use simulation::{Refit, Simulation};
@@ -65,14 +67,15 @@ pub fn learn_prior(
     let durations = &model.demonstrated().durations;
     let of = |(m, demo): (usize, &Demonstration)| Recording::new(demo, model, durations[m]).map_err(|e| e.in_demo(m));
     let recordings: Vec<Recording> = demos.iter().enumerate().map(of).collect::<Result<_>>()?;
+    let demos = fitted(model, demos, threads)?;
     let contexts = contexts_of(model)?;
-    let shown = Shown { demos, recordings: &recordings, contexts: contexts.as_deref() };
+    let shown = Shown { demos: &demos, recordings: &recordings, contexts: contexts.as_deref() };
     let refits = each(threads, &folds(demos.len(), groups)?, |fold| Refit::new(model, &shown, fold))?;
     let prior = prior_of(model, &recordings.iter().collect::<Vec<_>>())?;
     let simulation = Simulation { recordings: &recordings, refits: &refits, contexts: None, threads };
     let (settings, calibration) = simulation.learn(durations)?;
     let mixture = Mixture { settings, calibration, ..prior.mixture().clone() };
-    let learnt = Prior::new(model.kind(), mixture, prior.residual().to_vec())?;
+    let learnt = Prior::new(model.kind(), mixture, prior.residual().to_vec())?.of_model(model);
     let simulation = Simulation { contexts: contexts.as_deref(), ..simulation };
     match prior.deviations() {
         Some(deviations) if simulation.n_held_out()? >= MIN_DEMOS => {

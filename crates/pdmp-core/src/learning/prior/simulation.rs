@@ -5,7 +5,7 @@ use super::recording::Recording;
 use super::selection::{CORRELATION_TIMES, best, calibration, candidates, of_duration};
 use super::{Shown, each, prior_of};
 use crate::context::MapSelection;
-use crate::demonstration::{ContextValue, Demonstration, Sampling};
+use crate::demonstration::{ContextValue, Sampling};
 use crate::error::{Error, Result};
 use crate::inference::{Calibration, Prior, Recogniser, SHARES, Settings, Timing};
 use crate::learning::factorization::Truncation;
@@ -206,22 +206,7 @@ fn watch(
 
 /// Fits a model of the same style dimension to the training demonstrations of a fold.
 fn refit(model: &Model, shown: &Shown, fold: &Fold) -> Result<Model> {
-    let bare = |m: &usize| {
-        let demo = &shown.demos[*m];
-        let sampling = match demo.sampling() {
-            Sampling::Unknown => {
-                let n_steps = model.kind().steps(demo.n_samples()) as f64;
-                Sampling::Uniform { dt: model.demonstrated().durations[*m] / n_steps }
-            }
-            known => known.clone(),
-        };
-        let mut bare = Demonstration::new(demo.position().to_owned(), sampling)?;
-        if let Some(coordinates) = model.primitive().coordinates() {
-            bare = bare.with_rotations(coordinates.columns())?.with_units(coordinates.units().to_vec())?;
-        }
-        demo.goal().map_or(Ok(bare.clone()), |goal| bare.with_goal(goal.to_vec()))
-    };
-    let training = fold.training.iter().map(bare).collect::<Result<Vec<_>>>()?;
+    let training = fold.training.iter().map(|&m| shown.demos[m].clone()).collect::<Vec<_>>();
     let stamped = training.iter().any(|demo| matches!(demo.sampling(), Sampling::Stamped { .. }));
     let canonical = match CanonicalOptions::from(model.kind()) {
         CanonicalOptions::Rhythmic { mu, .. } if stamped => {
