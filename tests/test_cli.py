@@ -378,15 +378,17 @@ def test_recommended_conditions_are_options(
     assert "set --goal" in reported
 
 
+@pytest.mark.filterwarnings("default::UserWarning")
 def test_extrapolated_contexts_are_reported(
     model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A movement for a context outside the demonstrated ones is written, with a note."""
+    """A movement for a context far outside the demonstrated ones is written, with a warning."""
     out = tmp_path / "out.csv"
     assert run("rollout", model_file, "--context", 0.0, "-o", out) == 0
     assert capsys.readouterr().err == ""
     assert run("rollout", model_file, "--context", 1.2, "-o", out) == 0
-    assert "outside the demonstrated ones" in capsys.readouterr().err
+    reported = capsys.readouterr().err
+    assert "pdmp: warning: --context[0] = 1.2 lies outside the demonstrated range" in reported
 
 
 def test_errors_name_options(

@@ -796,7 +796,7 @@ class PartialFit:
         Raises
         ------
         ValueError
-            `other` has other settings.
+            `other` has other settings, or is this partial fit.
         """
     def factorise(
         self,
@@ -2155,7 +2155,7 @@ class Model:
         Raises
         ------
         ValueError
-            An argument that `controller` rejects, no movement, or rows or `out` that do not fit.
+            An argument that `controller` rejects, no movement, more than fit into memory, or rows or `out` that do not fit.
         TypeError
             As in `controller`.
 
@@ -2946,7 +2946,9 @@ class Estimate:
         """Time of arrival at the goal in s, on the clock of the observations; None for a rhythmic movement."""
     @property
     def fraction(self) -> float:
-        """Fraction of the movement at the last observation; of the cycle, in [0, 1), for a rhythmic one."""
+        """Time from the start to the last observation over the estimated duration, more than 1 after the end of the movement;
+        fraction of the cycle, in [0, 1), for a rhythmic one.
+        """
     @property
     def fraction_deviation(self) -> float:
         """Standard deviation of `fraction`."""
@@ -3299,6 +3301,9 @@ class Controller:
     ) -> None:
         """Restarts the movement.
 
+        Speed, limits, tolerance and gains stay in force. With `start` and `velocity` of the present motion, position and
+        velocity stay continuous, also in a pause; see `speed`.
+
         Parameters
         ----------
         conditions : Conditions, optional
@@ -3416,7 +3421,10 @@ class Controller:
     def speed(self) -> float:
         """Speed along the path relative to the rate 1 / tau: 0 pauses on the path, 1 resumes.
 
-        A change passes the filter of tau and stays in force after `reset`.
+        A change passes the filter of tau and stays in force after `reset`. A movement that starts with a given `velocity`
+        keeps it at any speed: ẏ = ρy′ with a rate ρ of at least max |ẏ|T / (k · range) at the start, up to 1 / tau, where
+        k = 15/8 for a discrete and π for a rhythmic movement. From there ρ passes the filter to speed / tau, so that a robot
+        in motion brakes into a pause, within the limits.
         """
     @speed.setter
     def speed(self, speed: float, /) -> None: ...
