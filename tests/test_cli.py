@@ -378,6 +378,17 @@ def test_recommended_conditions_are_options(
     assert "set --goal" in reported
 
 
+def test_arguments_without_an_option_are_those_of_python(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A remedy that no option of the command has is marked."""
+    noise = np.random.default_rng(3).normal(size=(400, 2))
+    rows = np.column_stack([0.01 * np.arange(400), noise])
+    np.savetxt(tmp_path / "noise.csv", rows, delimiter=",", header="t,x,y", comments="")
+    assert run("cycles", tmp_path / "noise.csv", "-o", tmp_path / "model") == 1
+    assert "give the onset of each cycle (onsets= in Python)" in capsys.readouterr().err
+
+
 @pytest.mark.filterwarnings("default::UserWarning")
 def test_extrapolated_contexts_are_reported(
     model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -54,6 +54,11 @@ impl Model {
     /// TypeError
     ///     As in `controller`.
     ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     As in `controller`, of the context that lies farthest outside.
+    ///
     /// Examples
     /// --------
     /// >>> goals = [[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]]

@@ -68,6 +68,12 @@ impl Model {
     /// TypeError
     ///     A keyword is unknown, or `conditions` has another type.
     ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+    ///     movement.
+    ///
     /// Examples
     /// --------
     /// >>> trajectory = model.rollout(goal=[1.1, 0.0], tau=2.0, dt=0.001)
@@ -134,6 +140,12 @@ impl Model {
     ///     `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length.
     /// TypeError
     ///     A keyword is unknown, or `conditions` or `limits` has another type.
+    ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+    ///     movement.
     ///
     /// Examples
     /// --------
