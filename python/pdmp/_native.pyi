@@ -1191,6 +1191,12 @@ class Model:
         TypeError
             A keyword is unknown, or `conditions` has another type.
 
+        Warns
+        -----
+        UserWarning
+            The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+            movement.
+
         Examples
         --------
         >>> trajectory = model.rollout(goal=[1.1, 0.0], tau=2.0, dt=0.001)
@@ -2159,6 +2165,11 @@ class Model:
         TypeError
             As in `controller`.
 
+        Warns
+        -----
+        UserWarning
+            As in `controller`, of the context that lies farthest outside.
+
         Examples
         --------
         >>> goals = [[1.0, 0.1], [1.1, 0.0], [0.9, 0.2]]
@@ -2208,6 +2219,12 @@ class Model:
             `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length.
         TypeError
             A keyword is unknown, or `conditions` or `limits` has another type.
+
+        Warns
+        -----
+        UserWarning
+            The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+            movement.
 
         Examples
         --------
