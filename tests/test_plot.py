@@ -374,7 +374,7 @@ def test_motion_rejects_other_degrees_of_freedom(
     ("trajectories", "message"),
     [
         (None, "trajectories = None: expected a Trajectory, as Model.rollout returns it"),
-        (np.zeros((9, 2)), "trajectories = .*: expected a Trajectory"),
+        (np.zeros((9, 2)), r"trajectories\[0\] = .*: expected a Trajectory"),
         ({"free": np.zeros((9, 2))}, r"trajectories\['free'\] = .*: expected a Trajectory"),
     ],
 )

@@ -96,8 +96,8 @@ def _labelled(
         labelled = [("", trajectory) for trajectory in trajectories]
     if not labelled:
         raise ValueError("trajectories is empty: pass at least one")
-    for label, trajectory in labelled:
-        name = f"trajectories[{label!r}]" if label else "trajectories"
+    for k, (label, trajectory) in enumerate(labelled):
+        name = f"trajectories[{label!r}]" if label else f"trajectories[{k}]"
         check_type(name, trajectory, Trajectory, EXPECTED)
     expected = labelled[0][1].names
     for k, (_, trajectory) in enumerate(labelled):
