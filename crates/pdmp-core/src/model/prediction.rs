@@ -37,7 +37,7 @@ impl Prediction {
     /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
     /// # let contexts = (0..demos.len()).map(|m| vec![(m as f64).into()]).collect();
     /// let model = fit(&demos, &FitOptions::new(Kind::Discrete).contexts(contexts))?;
-    /// assert_eq!([0.5, 2.1, 5.0].map(|h| model.predict(&[h.into()]).unwrap().far_value()), [None, None, Some(0)]);
+    /// assert_eq!([0.5, 2.1, 5.0].map(|h| model.predict(&[h]).unwrap().far_value()), [None, None, Some(0)]);
     /// # Ok(())
     /// # }
     /// ```
