@@ -1,5 +1,6 @@
 """Invalid arguments of movements are rejected; in the loop they leave the state unchanged."""
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -27,7 +28,7 @@ def rhythmic() -> pdmp.Model:
 SHARED: list[tuple[dict[str, Any], str]] = [
     ({"style": [1]}, "style has length 1, expected 2: one value per style dimension"),
     ({"style": [[1, 2]]}, r"style has shape \[1, 2\], expected one axis"),
-    ({"style": 1.0}, r"style has shape \[\], expected one axis"),
+    ({"style": 1.0}, r"style = 1.0, expected one axis: a list or array of numbers"),
     ({"style": [NAN, 0]}, r"style\[0\] = NaN: every number must be finite"),
     ({"style": [0, 1e200]}, r"style\[.*1\] = 1e200: magnitudes above .* overflow"),
     ({"style": ["a", "b"]}, "style has dtype"),
@@ -123,6 +124,38 @@ def test_rollouts_of_too_many_samples_are_rejected_in_one_line(
     with pytest.raises(ValueError, match="dt = .*: gives more than 1e7 samples: enlarge it") as e:
         discrete.rollout(dt=dt)
     assert len(str(e.value)) < 120
+
+
+@pytest.mark.parametrize("goal", [1.0, None, [[1.0, 2.0]]])
+def test_a_command_that_is_no_vector_is_told_its_length(discrete: pdmp.Model, goal: object) -> None:
+    """The error has the value or its shape, and the number of degrees of freedom."""
+    controller = discrete.controller(0.01)
+    with pytest.raises(ValueError, match="goal .*, expected one axis: .* of numbers, 2 of them$"):
+        controller.goal = goal
+
+
+def test_ticks_longer_than_the_movement_are_reported(discrete: pdmp.Model) -> None:
+    """A rate in place of a tick gives a warning with the tick; shorter ticks give none."""
+    with pytest.warns(
+        UserWarning, match=r"dt = 1000 s is longer than .* of 1000 Hz pass dt=0\.001"
+    ):
+        discrete.controller(1000)
+    with pytest.warns(UserWarning, match="dt = 100 s is longer than the movement"):
+        discrete.controllers(2, dt=100)
+    with pytest.warns(UserWarning, match="dt = 10 s is longer .*: the only sample is the start"):
+        assert len(discrete.rollout(dt=10).time) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        discrete.controller(discrete.duration)
+        discrete.controllers(2, dt=1.5, tau=[2.0, 1.0])
+        assert len(discrete.rollout(dt=10, duration=100).time) == 11
+        assert len(discrete.rollout(duration=0.0).time) == 1
+
+
+def test_durations_of_too_many_samples_are_rejected(discrete: pdmp.Model) -> None:
+    """A given duration is named beside the interval."""
+    with pytest.raises(ValueError, match=r"duration = 1000000000.0: more than .* or enlarge dt$"):
+        discrete.rollout(duration=1e9)
 
 
 @pytest.mark.parametrize("transition", [-1.0, NAN, INF, 1e200])

@@ -123,7 +123,7 @@ LISTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: [
             Demonstration(POSITION, names=names, **RATE) for names in (["x", "y"], ["y", "x"])
         ],
-        "demo 1: names differ",
+        'demo 1: names\\[0\\] = "y", but demo 0 has "x"',
     ),
     "different contexts": (
         lambda: [Demonstration(POSITION, context=context, **RATE) for context in ([1], [1, 2])],
@@ -149,7 +149,10 @@ def test_new_demonstration_has_the_labels_of_the_model() -> None:
     """A style is not inferred from a demonstration with other units or degrees of freedom."""
     described = {"dt": 0.02, "names": ["x", "y"], "units": ["m", "m"]}
     model = pdmp.fit([Demonstration(demo.position, **described) for demo in reaches()])
-    for other in ({"names": ["y", "x"]}, {"units": ["mm", "mm"]}):
+    for other, message in (
+        ({"names": ["x", "z"]}, r'names\[1\] = "z", but the model has "y": put the columns into'),
+        ({"units": ["mm", "mm"]}, r'units\[0\] = "mm", but the model has "m": convert'),
+    ):
         demo = Demonstration(POSITION, **(described | other))
-        with pytest.raises(ValueError, match=f"{next(iter(other))} differ from those of the model"):
+        with pytest.raises(ValueError, match=message):
             model.style_of(demo)

@@ -33,6 +33,7 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     *numbers("alpha_z", "between 1e-6 and 1e6", 0, -1, NAN, INF),
     *numbers("beta_z", "between 1e-6 and 1e6", 0, -1, NAN, INF),
     *numbers("alpha_x", "between 1e-6 and 1e6", 0, -1, NAN, INF),
+    *numbers("rotation_length", "between 1e-6 and 1e6", 0, -1, NAN, INF),
     *numbers("smoothing", "positive and finite", 0, -1, NAN, INF),
     *numbers("nominal", "must not be negative", -1),
     *numbers("n_styles", "", 0, -1),
@@ -67,6 +68,16 @@ def test_invalid_options_of_a_fit_are_rejected(option: dict[str, Any], message: 
     """The error states the option, its value and the allowed range."""
     with pytest.raises(ValueError, match=message):
         pdmp.fit([demo.position for demo in reaches()], **(RATE | option))
+
+
+@pytest.mark.parametrize("dt", [0, -5, NAN, INF])
+def test_an_invalid_interval_is_rejected_where_none_is_needed(dt: float) -> None:
+    """Demonstrations with times of their own do not hide it."""
+    with pytest.raises(ValueError, match="dt = .*: must be positive and finite"):
+        pdmp.fit(reaches(), dt=dt)
+    stamped = pdmp.Demonstration(POSITION, time=np.arange(len(POSITION)) * 0.1)
+    with pytest.raises(ValueError, match="dt = .*: must be positive and finite"):
+        pdmp.fit([stamped], dt=dt)
 
 
 RHYTHMIC: list[tuple[dict[str, Any], str]] = [

@@ -72,6 +72,25 @@ def test_options_of_readers_that_are_no_numbers_are_rejected_by_name(
         reader(Path("none"), **{name: "a"})
 
 
+@pytest.mark.parametrize("reader", [pdmp.io.read, pdmp.io.read_csv, pdmp.io.read_npz])
+def test_invalid_lengths_of_gaps_are_rejected_without_a_gap(reader: Callable[..., Any]) -> None:
+    """A length that is negative or no number is named before the file is read."""
+    for max_gap in (-1, float("nan")):
+        with pytest.raises(ValueError, match=f"^max_gap = {max_gap}: must not be negative"):
+            reader(Path("none.csv"), max_gap=max_gap)
+
+
+@pytest.mark.parametrize(
+    "reader",
+    [pdmp.load, pdmp.PartialFit.load, pdmp.Prior.load, pdmp.io.read_csv, pdmp.io.read_npz],
+)
+def test_paths_of_another_type_are_rejected_by_name(reader: Callable[..., Any]) -> None:
+    """The error has the name of the argument and its value."""
+    for path in (None, 3):
+        with pytest.raises(TypeError, match=f"^path = {path}: expected the path of a file"):
+            reader(path)
+
+
 @pytest.mark.parametrize("name", ["n_samples", "max_folds"])
 def test_numbers_of_an_evaluation_are_rejected_by_name(name: str) -> None:
     """A text in place of a number is rejected."""

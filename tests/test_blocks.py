@@ -213,8 +213,11 @@ def test_bad_sources_are_refused_before_a_block_is_read(tmp_path: Path, data_set
     (tmp_path / "empty").mkdir()
     with pytest.raises(ValueError, match=r"empty: no index\.csv, and no files: expected"):
         read(tmp_path / "empty")
-    with pytest.raises(ValueError, match=r"none: expected a folder or a file of one of \.csv"):
+    with pytest.raises(FileNotFoundError, match="No such file or directory: .*none"):
         read(tmp_path / "none")
+    (tmp_path / "some.doc").touch()
+    with pytest.raises(ValueError, match=r"some\.doc: expected a folder or a file of one of \.csv"):
+        read(tmp_path / "some.doc")
     with pytest.raises(ValueError, match="set: no column 'knee' among shoulder, elbow, wrist"):
         read(data_set, columns=["knee"])
     with pytest.raises(ValueError, match="set: no feature 'x' of numbers"):

@@ -378,15 +378,28 @@ def test_recommended_conditions_are_options(
     assert "set --goal" in reported
 
 
+def test_arguments_without_an_option_are_those_of_python(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A remedy that no option of the command has is marked."""
+    noise = np.random.default_rng(3).normal(size=(400, 2))
+    rows = np.column_stack([0.01 * np.arange(400), noise])
+    np.savetxt(tmp_path / "noise.csv", rows, delimiter=",", header="t,x,y", comments="")
+    assert run("cycles", tmp_path / "noise.csv", "-o", tmp_path / "model") == 1
+    assert "give the onset of each cycle (onsets= in Python)" in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("default::UserWarning")
 def test_extrapolated_contexts_are_reported(
     model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A movement for a context outside the demonstrated ones is written, with a note."""
+    """A movement for a context far outside the demonstrated ones is written, with a warning."""
     out = tmp_path / "out.csv"
     assert run("rollout", model_file, "--context", 0.0, "-o", out) == 0
     assert capsys.readouterr().err == ""
     assert run("rollout", model_file, "--context", 1.2, "-o", out) == 0
-    assert "outside the demonstrated ones" in capsys.readouterr().err
+    reported = capsys.readouterr().err
+    assert "pdmp: warning: --context[0] = 1.2 lies outside the demonstrated range" in reported
 
 
 def test_errors_name_options(

@@ -1,6 +1,7 @@
 """Maps from contexts to movements: their selection, covariance and extrapolation."""
 
 import pickle
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -278,6 +279,29 @@ def test_band_widens_gradually_beyond_the_contexts() -> None:
     lower, upper = model.band([0.165], dt=0.02)
     assert np.mean((lower <= bent(0.165)) & (bent(0.165) <= upper)) > 0.9
     assert half_width(-0.3) > 10 * border
+
+
+def test_movements_far_outside_the_contexts_are_reported() -> None:
+    """Each way to a movement warns beyond a tenth of the demonstrated range, and not before."""
+    model = curved(np.linspace(0.2, 0.7, 6))
+    controller = model.controller()
+    ways = (
+        lambda h: model.rollout(context=[h]),
+        lambda h: model.controller(context=[h]),
+        lambda h: controller.reset(context=[h]),
+        lambda h: model.rollouts(context=[[0.3], [h]]),
+        lambda h: model.controllers(2, context=[[0.3], [h]]),
+    )
+    for way in ways:
+        with pytest.warns(UserWarning, match=r"context\[0\] = 1.7 lies outside .* by 2.00 times"):
+            way(1.7)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            for height in (0.2, 0.7, 0.74, 0.16):
+                way(height)
+    named = pdmp.fit([bent(b) for b in (0.2, 0.3)], dt=0.02, contexts={"height": [1.0, 1.0]})
+    with pytest.warns(UserWarning, match=r'context\["height"\] = 2 differs from the only'):
+        named.rollout(context={"height": 2.0})
 
 
 def test_process_returns_to_its_mean_far_outside() -> None:

@@ -201,9 +201,41 @@ def test_unsuitable_outputs_are_rejected(reach: pdmp.Model, out: Any) -> None:
         reach.controllers(B, dt=0.01, out=out)
 
 
+def test_more_movements_than_fit_into_memory_are_refused(reach: pdmp.Model) -> None:
+    """A number that no machine holds is an error that names it, before memory is allocated."""
+    for n in (10**12, 2**62):
+        with pytest.raises(
+            ValueError, match="n_movements = .*: more movements than fit into memory"
+        ):
+            reach.controllers(n)
+
+
+def test_errors_of_one_movement_name_it(reach: pdmp.Model) -> None:
+    """The row of a bad number is in the error, of conditions, commands and rollouts."""
+    goal, tau = np.zeros((B, 2)), np.ones(B)
+    goal[3, 1], tau[4] = NAN, -1.0
+    controllers = reach.controllers(B, dt=0.01)
+    controllers.step()
+    for start in (
+        lambda **rows: reach.controllers(B, **rows),
+        lambda **rows: controllers.step(**rows),
+        lambda **rows: controllers.reset(**rows),
+    ):
+        with pytest.raises(ValueError, match=r"movement 3: goal\[1\] = NaN"):
+            start(goal=goal)
+        with pytest.raises(ValueError, match="movement 4: tau = -1"):
+            start(tau=tau)
+    assert (controllers.time == 0.01).all()
+    controllers.step(goal=goal, mask=np.arange(B) != 3)
+    with pytest.raises(ValueError, match=r"goal\[3, 1\] = NaN"):
+        reach.rollouts(goal=goal)
+    with pytest.raises(ValueError, match="movement 4: tau = -1"):
+        reach.rollouts(tau=tau)
+
+
 def test_no_movements_are_refused(reach: pdmp.Model) -> None:
     """There is at least one movement, and movements exist."""
-    with pytest.raises(ValueError, match="conditions"):
+    with pytest.raises(ValueError, match="n_movements = 0: start at least one movement"):
         reach.controllers(0)
     controllers = reach.controllers(B)
     with pytest.raises(ValueError, match="there are 6 movements"):

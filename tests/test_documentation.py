@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
 # Their snippets issue the warnings that they explain.
-WARNING = {"troubleshooting.md", "howto/styles-and-smoothing.md"}
+WARNING = {"troubleshooting.md", "howto/styles-and-smoothing.md", "concepts/contexts.md"}
 FENCE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 MODULES = ("io", "preprocessing", "evaluation", "plot", "datasets", "robots", "autodiff")
 

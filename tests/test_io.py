@@ -308,8 +308,11 @@ def test_read_takes_files_and_folders_together(folder: Path) -> None:
 
 def test_read_rejects_unknown_formats(tmp_path: Path) -> None:
     """Another suffix is rejected with the supported ones."""
+    (tmp_path / "demo.doc").touch()
     with pytest.raises(ValueError, match=r"expected a folder or a file of one of \.csv"):
-        pdmp.io.read([tmp_path / "demo.txt"])
+        pdmp.io.read([tmp_path / "demo.doc"])
+    with pytest.raises(FileNotFoundError, match="No such file or directory: .*none"):
+        pdmp.io.read([tmp_path / "none"])
 
 
 def test_context_needs_an_index(table: Path) -> None:

@@ -208,6 +208,40 @@ def test_limits_that_do_not_bind_leave_the_motion_bit_for_bit(model: pdmp.Model)
         assert limited.limited == [None, None]
 
 
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        ({"position": ([0, 0], [1, 1, 1])}, "position has 2 lower and 3 upper limits"),
+        ({"position": ([0, 0], None), "velocity": [1, 1, 1]}, "position: lower has length 2"),
+        ({"position": (None, [[1.0]])}, r"position: upper has shape \[1, 1\]"),
+    ],
+)
+def test_errors_of_positions_name_the_argument(limits: dict[str, Any], message: str) -> None:
+    """The two parts of `position` have no names in Python."""
+    with pytest.raises(ValueError, match=message):
+        pdmp.Limits(**limits)
+
+
+def test_a_restart_in_a_pause_brakes_within_the_limits(reach: pdmp.Model) -> None:
+    """Position and velocity given to `reset` at speed 0 stay continuous, and the robot stops."""
+    dt, limits = 0.001, pdmp.Limits(velocity=2.0, acceleration=10.0)
+    controller = reach.controller(dt, limits=limits)
+    for _ in range(400):
+        controller.step()
+    controller.speed = 0.0
+    for _ in range(20):
+        controller.step()
+    velocity = controller.velocity.copy()
+    assert abs(velocity).max() > 0.1
+    controller.reset(start=controller.position.copy(), velocity=velocity)
+    np.testing.assert_allclose(controller.velocity, velocity, rtol=1e-12)
+    for _ in range(1000):
+        controller.step()
+        assert (abs(controller.velocity - velocity) <= 10.0 * dt * (1 + 1e-9)).all()
+        velocity = controller.velocity.copy()
+    assert (velocity == 0).all()
+
+
 def test_a_goal_outside_is_approached_up_to_the_limit(reach: pdmp.Model) -> None:
     """The goal is the nearest point inside, and the movement finishes there."""
     limits = Limits(([-1.0, -1.0], [0.7, 1.0]), acceleration=[20.0, 20.0])
@@ -511,16 +545,19 @@ WRONG: list[tuple[Callable[[pdmp.Model], Any], str]] = [
         lambda m: Limits(velocity=1, jerk=50),
         "limits of DoF 0: a jerk of 50 needs a limit of the acceleration, .*; give both",
     ),
-    (lambda m: Limits(position=(0, 1e200)), r"upper\[0\] = 1e200: magnitudes above 1e150"),
+    (
+        lambda m: Limits(position=(0, 1e200)),
+        r"position: upper\[0\] = 1e200: magnitudes above 1e150",
+    ),
     (lambda m: Limits(velocity=[1, -1]), "velocity = -1: every limit must be positive"),
     (lambda m: Limits(acceleration=-INF), "acceleration = -inf: every limit must be positive"),
     (lambda m: Limits(velocity=NAN), r"velocity\[0\] = NaN"),
-    (lambda m: Limits(position=(0, [1, NAN])), r"upper\[1\] = NaN"),
+    (lambda m: Limits(position=(0, [1, NAN])), r"position: upper\[1\] = NaN"),
     (lambda m: Limits(position=(1, 1)), "limits of DoF 0: the lower limit 1 must be below"),
     (lambda m: Limits(position=(0, [1, -1])), "limits of DoF 1: the lower limit 0 must be below"),
     (lambda m: Limits(position=(INF, None)), "limits of DoF 0: the lower limit inf must be below"),
     (lambda m: Limits(velocity="fast"), "velocity has dtype"),
-    (lambda m: Limits(position=("a", "b")), "lower has dtype"),
+    (lambda m: Limits(position=("a", "b")), "position: lower has dtype"),
     (lambda m: Limits(velocity=[]), "velocity has length 0, expected 1"),
     (lambda m: Limits(velocity=[[1]]), r"velocity has shape \[1, 1\]"),
     (

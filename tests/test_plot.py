@@ -467,6 +467,20 @@ def test_motion_rejects_other_degrees_of_freedom(
         plot.motion(given.get(trajectories, []) if trajectories else [], limits=limits)
 
 
+@pytest.mark.parametrize(
+    ("trajectories", "message"),
+    [
+        (None, "trajectories = None: expected a Trajectory, as Model.rollout returns it"),
+        (np.zeros((9, 2)), r"trajectories\[0\] = .*: expected a Trajectory"),
+        ({"free": np.zeros((9, 2))}, r"trajectories\['free'\] = .*: expected a Trajectory"),
+    ],
+)
+def test_motion_rejects_other_types(trajectories: Any, message: str) -> None:
+    """A value that is no trajectory is named."""
+    with pytest.raises(TypeError, match=message):
+        plot.motion(trajectories)
+
+
 def test_variation_is_mean_and_deviation_of_each_group() -> None:
     """The line is the mean of a group at each percent, and the band one standard deviation."""
     time = np.linspace(0, 1, 101)[:, None]

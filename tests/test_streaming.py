@@ -97,6 +97,17 @@ def test_partial_fits_are_added_to(tmp_path: Path) -> None:
     assert repr(loaded).startswith("PartialFit(kind='discrete', n_demos=37")
 
 
+def test_files_of_models_and_partial_fits_are_told_apart(tmp_path: Path) -> None:
+    """Each reader names what the other file holds, and the reader for it."""
+    demos = recordings()[:5]
+    pdmp.PartialFit(demos).save(tmp_path / "partial")
+    pdmp.fit(demos).save(tmp_path / "model")
+    with pytest.raises(pdmp.ModelFileError, match=r"a partial fit, .*\(pdmp.PartialFit.load\)$"):
+        pdmp.load(tmp_path / "partial")
+    with pytest.raises(pdmp.ModelFileError, match=r"a model, not a partial fit: .* \(pdmp.load\)$"):
+        pdmp.PartialFit.load(tmp_path / "model")
+
+
 def test_parts_of_the_second_pass_can_be_pickled() -> None:
     """Projection and styles are sent to other processes."""
     demos = recordings()
@@ -123,6 +134,14 @@ def test_errors_name_the_argument_and_the_remedy() -> None:
         pdmp.fit([demos[:8], [demos[8], np.zeros((50, 1))]], dt=0.01)
     with pytest.raises(ValueError, match="blocks differ between the passes"):
         pdmp.PartialFit(demos).finish([demos[1:], demos[:1]])
+    with pytest.raises(TypeError, match="blocks = None: expected a list or another iterable"):
+        pdmp.PartialFit(demos).finish(None)
+    with pytest.raises(TypeError, match="the function of blocks returned None: expected a list"):
+        pdmp.fit(lambda: None)
+    partial = pdmp.PartialFit(demos)
+    with pytest.raises(ValueError, match="other is this partial fit: .* would count twice"):
+        partial.merge(partial)
+    assert partial.n_demos == len(demos)
     with pytest.raises(ValueError, match="other has other settings"):
         pdmp.PartialFit(demos).merge(pdmp.PartialFit(demos, n_samples=99))
 
@@ -132,6 +151,29 @@ def test_errors_name_the_argument_and_the_remedy() -> None:
 
     with pytest.raises(KeyError, match="disk"):
         pdmp.fit(broken)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_passes_over_other_blocks_are_refused(noise: float) -> None:
+    """Every pass reads the demonstrations of the first one: fewer, more, changed or in disorder."""
+    rng = np.random.default_rng(7)
+    positions = [demo.position for demo in recordings()]
+    noisy = [position + noise * rng.standard_normal(position.shape) for position in positions]
+    demos = [pdmp.Demonstration(position, dt=0.01) for position in noisy]
+    changed = pdmp.Demonstration(1.01 * demos[5].position, dt=0.01)
+    for others in (
+        demos[:-1],
+        [*demos, demos[0]],
+        [*demos[:5], changed, *demos[6:]],
+        [demos[1], demos[0], *demos[2:]],
+    ):
+        passes = iter([demos])
+
+        def read(passes: Any = passes, others: Any = others) -> Any:
+            return iter(blocks_of(next(passes, others)))
+
+        with pytest.raises(ValueError, match="blocks differ between the passes"):
+            pdmp.fit(read)
 
 
 def test_progress_cancels_a_fit_of_blocks() -> None:

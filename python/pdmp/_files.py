@@ -7,6 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from pdmp._messages import check_type
+
+
+def file_path(path: str | os.PathLike[str], name: str = "path") -> Path:
+    """Returns the path of an argument."""
+    check_type(name, path, (str, os.PathLike), "the path of a file or folder")
+    return Path(path)
+
 
 def check_folder(path: Path) -> None:
     """Raises FileNotFoundError if the folder of a file does not exist."""
@@ -22,7 +30,7 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     Symbolic links are followed. A pipe or a device is written directly. The folder must exist: one
     that was mistyped is not created.
     """
-    path = Path(path)
+    path = file_path(path)
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     check_folder(path)

@@ -799,7 +799,7 @@ class PartialFit:
         Raises
         ------
         ValueError
-            `other` has other settings.
+            `other` has other settings, or is this partial fit.
         """
     def factorise(
         self,
@@ -1193,6 +1193,12 @@ class Model:
             A length is wrong, a number is not finite, or a condition belongs to the other kind of primitive.
         TypeError
             A keyword is unknown, or `conditions` has another type.
+
+        Warns
+        -----
+        UserWarning
+            The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+            movement.
 
         Examples
         --------
@@ -2167,9 +2173,14 @@ class Model:
         Raises
         ------
         ValueError
-            An argument that `controller` rejects, no movement, or rows or `out` that do not fit.
+            An argument that `controller` rejects, no movement, more than fit into memory, or rows or `out` that do not fit.
         TypeError
             As in `controller`.
+
+        Warns
+        -----
+        UserWarning
+            As in `controller`, of the context that lies farthest outside.
 
         Examples
         --------
@@ -2220,6 +2231,12 @@ class Model:
             `dt` or `transition` is out of range, `rollout` rejects the conditions, or limits have a wrong length.
         TypeError
             A keyword is unknown, or `conditions` or `limits` has another type.
+
+        Warns
+        -----
+        UserWarning
+            The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+            movement.
 
         Examples
         --------
@@ -2958,7 +2975,9 @@ class Estimate:
         """Time of arrival at the goal in s, on the clock of the observations; None for a rhythmic movement."""
     @property
     def fraction(self) -> float:
-        """Fraction of the movement at the last observation; of the cycle, in [0, 1), for a rhythmic one."""
+        """Time from the start to the last observation over the estimated duration, more than 1 after the end of the movement;
+        fraction of the cycle, in [0, 1), for a rhythmic one.
+        """
     @property
     def fraction_deviation(self) -> float:
         """Standard deviation of `fraction`."""
@@ -3311,6 +3330,9 @@ class Controller:
     ) -> None:
         """Restarts the movement.
 
+        Speed, limits, tolerance and gains stay in force. With `start` and `velocity` of the present motion, position and
+        velocity stay continuous, also in a pause; see `speed`.
+
         Parameters
         ----------
         conditions : Conditions, optional
@@ -3428,7 +3450,10 @@ class Controller:
     def speed(self) -> float:
         """Speed along the path relative to the rate 1 / tau: 0 pauses on the path, 1 resumes.
 
-        A change passes the filter of tau and stays in force after `reset`.
+        A change passes the filter of tau and stays in force after `reset`. A movement that starts with a given `velocity`
+        keeps it at any speed: ẏ = ρy′ with a rate ρ of at least max |ẏ|T / (k · range) at the start, up to 1 / tau, where
+        k = 15/8 for a discrete and π for a rhythmic movement. From there ρ passes the filter to speed / tau, so that a robot
+        in motion brakes into a pause, within the limits.
         """
     @speed.setter
     def speed(self, speed: float, /) -> None: ...

@@ -330,7 +330,8 @@ typedef struct {
     double duration_deviation;
     /// Time of arrival at the goal, in seconds on the clock of the observations; that of the end of the cycle if rhythmic.
     double arrival;
-    /// Fraction of the movement at the last observation; of the cycle, in [0, 1), for a rhythmic one.
+    /// Time from the start to the last observation over the estimated duration, more than 1 after the end; of a rhythmic
+    /// movement, the fraction of the cycle in [0, 1).
     double fraction;
     /// Standard deviation of `fraction`.
     double fraction_deviation;
@@ -487,7 +488,8 @@ pdmp_status pdmp_controller_set_phase_gain(pdmp_controller *controller,
                                            double gain);
 
 /// Sets the speed in [0, 1e6], a factor of the rate 1/tau: 0 pauses the movement on its path, 1 is the default. The
-/// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
+/// change is filtered like tau, and persists across pdmp_controller_reset. A movement that starts with a given velocity
+/// keeps it at any speed, and brakes from it into a pause, within the limits. Errors: PDMP_NULL, PDMP_RANGE.
 pdmp_status pdmp_controller_set_speed(pdmp_controller *controller, double speed);
 
 /// Sets the tolerance in (0, 1] of a movement that has settled, PDMP_FINISHED; 0.005 by default. It is relative to the

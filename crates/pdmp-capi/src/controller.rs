@@ -256,7 +256,8 @@ pub extern "C" fn pdmp_controller_set_phase_gain(controller: Option<&mut pdmp_co
 }
 
 /// Sets the speed in [0, 1e6], a factor of the rate 1/tau: 0 pauses the movement on its path, 1 is the default. The
-/// change is filtered like tau, and persists across pdmp_controller_reset. Errors: PDMP_NULL, PDMP_RANGE.
+/// change is filtered like tau, and persists across pdmp_controller_reset. A movement that starts with a given velocity
+/// keeps it at any speed, and brakes from it into a pause, within the limits. Errors: PDMP_NULL, PDMP_RANGE.
 #[unsafe(no_mangle)]
 pub extern "C" fn pdmp_controller_set_speed(controller: Option<&mut pdmp_controller>, speed: f64) -> pdmp_status {
     call_on(controller, |controller| Ok(controller.inner.set_speed(speed).map(|()| PDMP_OK)?))

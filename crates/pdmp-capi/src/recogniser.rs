@@ -61,7 +61,8 @@ pub struct pdmp_estimate {
     pub duration_deviation: f64,
     /// Time of arrival at the goal, in seconds on the clock of the observations; that of the end of the cycle if rhythmic.
     pub arrival: f64,
-    /// Fraction of the movement at the last observation; of the cycle, in [0, 1), for a rhythmic one.
+    /// Time from the start to the last observation over the estimated duration, more than 1 after the end; of a rhythmic
+    /// movement, the fraction of the cycle in [0, 1).
     pub fraction: f64,
     /// Standard deviation of `fraction`.
     pub fraction_deviation: f64,

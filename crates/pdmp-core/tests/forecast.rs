@@ -107,7 +107,7 @@ fn invalid_horizons_are_rejected() {
     for dt in [0.0, -1.0, f64::NAN] {
         assert!(message(1.0, Some(dt)).starts_with("dt = "));
     }
-    assert_eq!(message(1.0, Some(1e-9)), "dt = 1e-9: gives more than 1e7 samples: enlarge it");
+    assert_eq!(message(1.0, Some(1e-9)), "horizon = 1: more than 1e7 intervals of dt: shorten it, or enlarge dt");
     assert_eq!(message(1e9, Some(1e8)), "dt = 100000000: must not exceed 1000 tau");
     assert_eq!(controller.forecast(0.0, None).unwrap().position.nrows(), 1);
 }

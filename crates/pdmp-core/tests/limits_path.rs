@@ -301,7 +301,8 @@ fn pending_goal_is_taken_up_when_limits_are_removed() {
 fn given_velocity_does_not_depend_on_the_speed() {
     let velocity = vec![0.3, -0.2, 0.1];
     let conditions = Conditions { velocity: Some(velocity.clone()), ..Conditions::default() };
-    for (speed, limited) in [(0.5, false), (2.0, false), (0.5, true), (f64::INFINITY, true)] {
+    let finite = [0.0, 1e-3, 0.5, 2.0].into_iter().flat_map(|speed| [(speed, false), (speed, true)]);
+    for (speed, limited) in finite.chain([(f64::INFINITY, true)]) {
         let mut controller = Controller::new(REACH.primitive(), 1e-3, &conditions, None).unwrap();
         if limited {
             controller.set_limits(&limits(&REACH, [2.0, 2.0])).unwrap();
@@ -310,6 +311,80 @@ fn given_velocity_does_not_depend_on_the_speed() {
         for (found, expected) in controller.velocity().iter().zip(&velocity) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected} at {speed}");
         }
+    }
+}
+
+/// A movement that starts in a pause, or at a low speed, with a given velocity brakes from it within the limits: after a
+/// restart in motion and from the start, with and without a limit of the jerk, filtered or switched. It stays near its start,
+/// and resumes no faster than a demonstrated movement or the given velocity.
+#[test]
+fn given_velocity_is_braked_into_a_pause() {
+    let dt = 1e-3;
+    for (model, speed, transition, jerk) in [&*REACH, &*CYCLE].into_iter().flat_map(|model| {
+        [(0.0, None, false), (0.0, None, true), (0.0, Some(0.0), false), (1e-3, None, false)]
+            .map(|(speed, transition, jerk)| (model, speed, transition, jerk))
+    }) {
+        let mut limits = limits(model, [2.0, 2.0]);
+        if jerk {
+            limits.jerk = limits.acceleration.as_ref().map(|all| all.iter().map(|limit| 50.0 * limit).collect());
+        }
+        let peaks: Vec<f64> = limits.velocity.iter().flatten().map(|limit| 0.5 * limit).collect();
+        for share in [1e-6, 0.1, 1.0] {
+            let velocity: Vec<f64> = peaks.iter().map(|peak| share * peak).collect();
+            let conditions = Conditions { velocity: Some(velocity.clone()), ..Conditions::default() };
+            let mut controller = Controller::new(model.primitive(), dt, &Conditions::default(), transition).unwrap();
+            controller.set_limits(&limits).unwrap();
+            (0..50).for_each(|_| controller.step().map(drop).unwrap());
+            controller.set_speed(speed).unwrap();
+            controller.reset(&conditions).unwrap();
+            let start = controller.position().to_vec();
+            let mut before = controller.velocity().to_vec();
+            assert!(before.iter().zip(&velocity).all(|(found, given)| (found - given).abs() < 1e-12));
+            let mut away = 0.0f64;
+            for _ in 0..1500 {
+                controller.step().unwrap();
+                let [velocity, acceleration] = used(&limits, &before, controller.velocity(), dt);
+                assert!(velocity <= 1.0 + 1e-9 && acceleration <= 1.0 + 1e-9, "{velocity} {acceleration}");
+                before.copy_from_slice(controller.velocity());
+                for ((y, start), range) in controller.position().iter().zip(&start).zip(model.ranges()) {
+                    away = away.max((y - start).abs() / range);
+                }
+            }
+            assert!(away < 0.5 * share + 0.02 * (speed / 1e-3), "{away} at {share}");
+            assert!(before.iter().zip(&peaks).all(|(v, peak)| v.abs() <= (10.0 * speed + 1e-9) * peak), "{before:?}");
+            controller.set_speed(1.0).unwrap();
+            for _ in 0..1500 {
+                controller.step().unwrap();
+                let [velocity, acceleration] = used(&limits, &before, controller.velocity(), dt);
+                assert!(velocity <= 0.75 && acceleration <= 1.0 + 1e-9, "{velocity} {acceleration}");
+                before.copy_from_slice(controller.velocity());
+            }
+        }
+    }
+}
+
+/// Without limits, a given velocity passes into a pause without a step: its change over a tick is proportional to the tick.
+#[test]
+fn given_velocity_is_continuous_without_limits() {
+    for model in [&*REACH, &*CYCLE] {
+        let velocity = vec![0.3; model.n_dofs()];
+        let conditions = Conditions { velocity: Some(velocity.clone()), ..Conditions::default() };
+        let largest = |dt: f64| {
+            let mut controller = Controller::new(model.primitive(), dt, &conditions, None).unwrap();
+            controller.set_speed(0.0).unwrap();
+            let (mut before, mut largest) = (velocity.clone(), 0.0f64);
+            for _ in 0..(1.5 / dt) as usize {
+                controller.step().unwrap();
+                for (v, before) in controller.velocity().iter().zip(&before) {
+                    largest = largest.max((v - before).abs());
+                }
+                before.copy_from_slice(controller.velocity());
+            }
+            assert!(before.iter().all(|v| v.abs() < 1e-12), "{before:?}");
+            largest
+        };
+        let [coarse, fine] = [2e-3, 2e-4].map(largest);
+        assert!((9.0..11.0).contains(&(coarse / fine)), "{coarse} {fine}");
     }
 }
 

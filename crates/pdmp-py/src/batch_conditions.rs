@@ -12,7 +12,7 @@ use crate::conditions::{Conditions, changed, reject_style};
 use crate::convert::{array, items};
 use crate::error::raise;
 use crate::instance;
-use crate::named_contexts::contexts_for;
+use crate::named_contexts::{contexts_for, warn_of_extrapolation};
 
 /// Returns the conditions of a batch: `conditions` of all movements or of each, single ones replaced by `changes`, those
 /// absent from both predicted for the context of all movements or of each.
@@ -38,8 +38,10 @@ pub(crate) fn batch_conditions_of(
         let has_style = rows.iter().any(|(name, _)| name == "style") || bases.iter().any(|base| base.style.is_some());
         reject_style(has_style)?;
         let (contexts, is_matrix) = contexts_for(model, context)?;
-        let predict = || contexts.iter().map(|context| Ok(model.predict(context)?.conditions));
-        let predicted: Vec<Inner> = py.detach(|| predict().collect::<pdmp_core::Result<_>>()).map_err(raise)?;
+        let predict = || contexts.iter().map(|context| model.predict(context)).collect::<pdmp_core::Result<Vec<_>>>();
+        let predictions = py.detach(predict).map_err(raise)?;
+        warn_of_extrapolation(py, model, &contexts, &predictions)?;
+        let predicted: Vec<Inner> = predictions.into_iter().map(|prediction| prediction.conditions).collect();
         let (found, expected) = (predicted.len(), bases.len());
         if is_matrix && is_list && found != expected {
             return Err(raise(Error::Rows { name: "context", expected, found }));

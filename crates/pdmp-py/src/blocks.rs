@@ -4,9 +4,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use pdmp_core::Error;
 use pdmp_core::learning::Blocks as CoreBlocks;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyIterator, PyList, PyTuple};
 
+use crate::convert::quoted;
 use crate::demonstration::Demonstration;
 use crate::fit::demonstrations;
 
@@ -37,7 +39,12 @@ impl Blocks {
         let started = Python::attach(|py| {
             let source = self.source.bind(py);
             let blocks = if source.is_callable() { source.call0()? } else { source.clone() };
-            Ok(blocks.try_iter()?.unbind())
+            let wrong = |_| {
+                let owner = if source.is_callable() { "the function of blocks returned" } else { "blocks =" };
+                let expected = "expected a list or another iterable of blocks, each a list of demonstrations";
+                PyTypeError::new_err(format!("{owner} {}: {expected}", quoted(&blocks)))
+            };
+            Ok(blocks.try_iter().map_err(wrong)?.unbind())
         });
         let mut iterator: Option<PyResult<Py<PyIterator>>> = Some(started);
         let mut index = 0;

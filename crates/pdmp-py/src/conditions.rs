@@ -10,6 +10,7 @@ use pyo3::types::PyDict;
 use crate::convert::{read_only, vector};
 use crate::error::{ascii, raise};
 use crate::instance;
+use crate::named_contexts::{context_for, predicted};
 use crate::scalar::{Scalar, number};
 use crate::via_points::AdditionalForcing;
 
@@ -264,7 +265,7 @@ pub(crate) fn own_and_predicted(
     let own = changed(base, crate::labelled::in_order(model, changes)?.as_ref())?;
     let Some(context) = context else { return Ok((own, None)) };
     reject_style(own.style.is_some())?;
-    let prediction = model.predict(&crate::named_contexts::context_for(model, context)?).map_err(raise)?;
+    let prediction = predicted(context.py(), model, &context_for(model, context)?)?;
     Ok((own, Some(prediction)))
 }
 

@@ -171,6 +171,9 @@ impl Controller {
 
     /// Restarts the movement.
     ///
+    /// Speed, limits, tolerance and gains stay in force. With `start` and `velocity` of the present motion, position and
+    /// velocity stay continuous, also in a pause; see `speed`.
+    ///
     /// Parameters
     /// ----------
     /// conditions : Conditions, optional
@@ -326,7 +329,10 @@ impl Controller {
 
     /// Speed along the path relative to the rate 1 / tau: 0 pauses on the path, 1 resumes.
     ///
-    /// A change passes the filter of tau and stays in force after `reset`.
+    /// A change passes the filter of tau and stays in force after `reset`. A movement that starts with a given `velocity`
+    /// keeps it at any speed: ẏ = ρy′ with a rate ρ of at least max |ẏ|T / (k · range) at the start, up to 1 / tau, where
+    /// k = 15/8 for a discrete and π for a rhythmic movement. From there ρ passes the filter to speed / tau, so that a robot
+    /// in motion brakes into a pause, within the limits.
     #[getter]
     fn speed(&self) -> f64 {
         self.inner.speed()

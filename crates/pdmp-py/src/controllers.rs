@@ -136,7 +136,11 @@ impl Controllers {
             speed: buffers.numbers(3),
         };
         if has_commands {
-            self.inner.update(&commands, mask.as_deref(), &mut motions).map_err(raise)?;
+            let updated = self.inner.update(&commands, mask.as_deref(), &mut motions);
+            updated.map_err(|error| match self.inner.first_rejected(&commands, mask.as_deref()) {
+                Some(b) => PyValueError::new_err(format!("movement {b}: {}", raise(error).value(py))),
+                None => raise(error),
+            })?;
         } else {
             self.inner.step(mask.as_deref(), &mut motions).map_err(raise)?;
         }

@@ -12,7 +12,7 @@ use crate::conditions::{Conditions, changed, reject_style};
 use crate::convert::{array, items, plain};
 use crate::error::raise;
 use crate::instance;
-use crate::named_contexts::contexts_for;
+use crate::named_contexts::{contexts_for, warn_of_extrapolation};
 
 /// Commands of a tick, in memory that later ticks use again.
 #[derive(Default)]
@@ -167,8 +167,10 @@ pub(crate) fn conditions_of_each(
         reject_style(all.iter().any(|one| one.style.is_some()))?;
         let (contexts, _) = contexts_for(model, context)?;
         is_each("context", contexts.len())?;
-        let predict = || contexts.iter().map(|context| Ok(model.predict(context)?.conditions));
-        let predicted: Vec<Inner> = py.detach(|| predict().collect::<pdmp_core::Result<_>>()).map_err(raise)?;
+        let predict = || contexts.iter().map(|context| model.predict(context)).collect::<pdmp_core::Result<Vec<_>>>();
+        let predictions = py.detach(predict).map_err(raise)?;
+        warn_of_extrapolation(py, model, &contexts, &predictions)?;
+        let predicted: Vec<Inner> = predictions.into_iter().map(|prediction| prediction.conditions).collect();
         let predicted = predicted.into_iter().cycle();
         all = all.into_iter().zip(predicted).map(|(one, predicted)| one.or(predicted)).collect();
     }

@@ -1,5 +1,7 @@
 //! Conversion of Python arguments and results: anything that numpy converts to float64 in, float64 out.
 
+use std::path::PathBuf;
+
 use ndarray::{Array1, Array2, ArrayD, Dimension, Ix1};
 use numpy::{
     AllowTypeChange, IntoPyArray, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn,
@@ -47,6 +49,18 @@ pub(crate) fn items<'py, T>(
         converted.push(convert(&format!("{name}[{}]", converted.len()), &item?)?);
     }
     Ok(converted)
+}
+
+/// Path of a file, converted with an error that names the argument.
+pub(crate) struct FilePath(pub(crate) PathBuf);
+
+impl<'py> FromPyObject<'_, 'py> for FilePath {
+    type Error = PyErr;
+
+    fn extract(value: pyo3::Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let wrong = |_| PyTypeError::new_err(format!("path = {}: expected the path of a file", quoted(&value)));
+        value.extract().map(Self).map_err(wrong)
+    }
 }
 
 /// Converts a list of texts.
@@ -193,9 +207,10 @@ pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>>
     }
     let array = array(name, value)?;
     let shape = array.shape().to_vec();
-    let vector = array
-        .into_dimensionality::<Ix1>()
-        .map_err(|_| PyValueError::new_err(format!("{name} has shape {shape:?}, expected one axis")))?;
+    let vector = array.into_dimensionality::<Ix1>().map_err(|_| {
+        let found = if shape.is_empty() { format!("= {}", quoted(value)) } else { format!("has shape {shape:?}") };
+        PyValueError::new_err(format!("{name} {found}, expected one axis: a list or array of numbers"))
+    })?;
     Ok(vector.to_vec())
 }
 

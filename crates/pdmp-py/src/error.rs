@@ -1,13 +1,14 @@
 //! Python exceptions for errors of the core, and long calls that can be interrupted.
 
 use std::cell::Cell;
+use std::ffi::CString;
 use std::path::Path;
 
 use pdmp_core::{Error, ErrorKind};
 use pyo3::create_exception;
 use pyo3::exceptions::{
     PyException, PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyPermissionError,
-    PyRecursionError, PyValueError,
+    PyRecursionError, PyUserWarning, PyValueError,
 };
 use pyo3::prelude::*;
 
@@ -18,7 +19,8 @@ create_exception!(pdmp, ModelFileError, PdmpError, "Model file that is damaged, 
 /// Returns the Python exception of a core error: `ValueError` for arguments and data, `OSError` for the system, and the
 /// module's own for fits and model files.
 pub(crate) fn raise(error: Error) -> PyErr {
-    let text = printable(&format!("{error}{}", hint(&error)));
+    let place = if matches!(error.argument(), Some("lower" | "upper")) { "position: " } else { "" };
+    let text = printable(&format!("{place}{error}{}", hint(&error)));
     match error.kind() {
         ErrorKind::Argument | ErrorKind::Data => PyValueError::new_err(text),
         ErrorKind::Numerical => FitError::new_err(text),
@@ -36,6 +38,9 @@ pub(crate) fn raise(error: Error) -> PyErr {
 fn hint(error: &Error) -> &'static str {
     match error {
         Error::Demo { source, .. } => hint(source),
+        Error::Movement(error) => hint(&error.source),
+        Error::File(reason) if reason.contains("load it as a partial fit") => " (pdmp.PartialFit.load)",
+        Error::File(reason) if reason.ends_with("load it as a model") => " (pdmp.load)",
         Error::Aperiodic { .. } => " (onsets=)",
         Error::Argument { name: "time", .. } => " (dt= or time=)",
         _ => "",
@@ -52,6 +57,11 @@ fn system_error(path: &Path, source: &std::io::Error) -> PyErr {
         // EINVAL: the path is invalid before any system call.
         (None, _) => PyOSError::new_err((22, reason, path)),
     }
+}
+
+/// Issues a `UserWarning` at the line that called the library.
+pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(printable(text))?, 1)
 }
 
 /// Escapes control characters, among them line breaks and marks of the writing direction: names and labels come from

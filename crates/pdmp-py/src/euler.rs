@@ -1,9 +1,7 @@
 //! Conversions of Euler angles.
 
-use std::ffi::CString;
-
 use pdmp_core::preprocessing::orientation::{self, EulerSequence};
-use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::choice::Choice;
@@ -115,7 +113,7 @@ pub(crate) fn quaternions_to_euler<'py>(
              sequence whose second angle stays away from its bounds",
             if n == 1 { "" } else { "s" }
         );
-        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(text)?, 1)?;
+        crate::error::warn(py, &text)?;
     }
     Ok(angles)
 }

@@ -1,21 +1,15 @@
 //! Warnings about implausible samples of demonstrations.
 
-use std::ffi::CString;
-
 use pdmp_core::preprocessing::inspection::{Finding, inspect, unwound};
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
 use crate::demonstration::Demonstration;
+use crate::error;
 use crate::scalar::{Scalar, optional_number};
 
 /// Issues a `UserWarning` for each finding, at the line that called the library.
 pub(crate) fn warn(py: Python<'_>, findings: &[Finding]) -> PyResult<()> {
-    let category = py.get_type::<PyUserWarning>();
-    for finding in findings {
-        PyErr::warn(py, &category, &CString::new(finding.to_string())?, 1)?;
-    }
-    Ok(())
+    findings.iter().try_for_each(|finding| error::warn(py, &finding.to_string()))
 }
 
 /// Inspects demonstrations as `fit` does.

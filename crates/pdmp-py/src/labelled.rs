@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping, PyString, PyTuple};
 
-use crate::convert::refill;
+use crate::convert::{array, refill};
 use crate::error::ascii;
 
 /// Conditions whose elements are coordinates.
@@ -58,10 +58,16 @@ pub(crate) fn refill_in_order(
     value: &Bound<'_, PyAny>,
     buffer: &mut Vec<f64>,
 ) -> PyResult<()> {
-    match arranged(argument, names, value)? {
+    let refilled = match arranged(argument, names, value)? {
         Some(values) => refill(argument, &values, buffer),
         None => refill(argument, value, buffer),
-    }
+    };
+    refilled.map_err(|error| match array(argument, value) {
+        Ok(found) if found.ndim() != 1 => {
+            PyValueError::new_err(format!("{}, {} of them", error.value(value.py()), names.len()))
+        }
+        _ => error,
+    })
 }
 
 /// Returns the elements of a mapping or a series, or the columns of a data frame, in the order of these names; `None`

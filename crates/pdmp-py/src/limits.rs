@@ -70,8 +70,8 @@ impl Limits {
         let pair = position.map(|position| pair("position", position, "limits (lower, upper)")).transpose()?;
         let (lower, upper) = pair.map(|[lower, upper]| (lower, upper)).unzip();
         let limits = Inner {
-            lower: limit("lower", lower.as_ref())?,
-            upper: limit("upper", upper.as_ref())?,
+            lower: limit("position: lower", lower.as_ref())?,
+            upper: limit("position: upper", upper.as_ref())?,
             velocity: limit("velocity", velocity)?,
             acceleration: limit("acceleration", acceleration)?,
             jerk: limit("jerk", jerk)?,

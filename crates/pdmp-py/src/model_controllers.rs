@@ -14,6 +14,7 @@ use crate::convert::{Matrix, items, threads};
 use crate::error::raise;
 use crate::instance;
 use crate::model::Model;
+use crate::motion::warn_of_long_tick;
 use crate::scalar::{Scalar, optional_number};
 
 #[pymethods]
@@ -49,9 +50,14 @@ impl Model {
     /// Raises
     /// ------
     /// ValueError
-    ///     An argument that `controller` rejects, no movement, or rows or `out` that do not fit.
+    ///     An argument that `controller` rejects, no movement, more than fit into memory, or rows or `out` that do not fit.
     /// TypeError
     ///     As in `controller`.
+    ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     As in `controller`, of the context that lies farthest outside.
     ///
     /// Examples
     /// --------
@@ -86,9 +92,14 @@ impl Model {
         let n = n_movements.count("n_movements")?;
         let threads = threads.map_or(Ok(Threads::ONE), |threads| self::threads(Some(threads)))?;
         let (dt, transition) = (dt.number("dt")?, optional_number("transition", transition)?);
+        if n == 0 {
+            return Err(PyValueError::new_err("n_movements = 0: start at least one movement"));
+        }
+        pdmp_core::motion::Controllers::check_memory(self.0.primitive(), n).map_err(raise)?;
         let conditions = conditions_of_each(py, &self.0, n, conditions, context, changes)?;
         let mut inner =
             pdmp_core::motion::Controllers::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
+        warn_of_long_tick(py, inner.get(0).map_err(raise)?)?;
         if let Some(limits) = limits {
             let limits = instance::limits(limits)?;
             (0..n).try_for_each(|b| inner.set_limits(b, limits)).map_err(raise)?;

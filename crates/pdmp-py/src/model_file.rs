@@ -1,12 +1,11 @@
 //! Model files.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::convert::Reduced;
+use crate::convert::{FilePath, Reduced};
 use crate::error::raise;
 use crate::instance;
 use crate::model::Model;
@@ -40,8 +39,8 @@ use crate::model::Model;
 /// >>> np.array_equal(loaded.styles, model.styles)
 /// True
 #[pyfunction]
-pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
-    py.detach(|| pdmp_core::Model::load(&path)).map(|model| Model(Arc::new(model))).map_err(raise)
+pub(crate) fn load(py: Python<'_>, path: FilePath) -> PyResult<Model> {
+    py.detach(|| pdmp_core::Model::load(&path.0)).map(|model| Model(Arc::new(model))).map_err(raise)
 }
 
 #[pymethods]
@@ -76,9 +75,9 @@ impl Model {
     /// >>> len(pdmp.Prior.load(path).parameters) == model.n_demos
     /// True
     #[pyo3(signature = (path, *, prior=None))]
-    fn save(&self, py: Python<'_>, path: PathBuf, prior: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    fn save(&self, py: Python<'_>, path: FilePath, prior: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let prior = prior.map(instance::prior).transpose()?;
-        let save = || prior.map_or_else(|| self.0.save(&path), |prior| prior.save(&self.0, &path));
+        let save = || prior.map_or_else(|| self.0.save(&path.0), |prior| prior.save(&self.0, &path.0));
         py.detach(save).map_err(raise)
     }
 

@@ -12,12 +12,27 @@ use crate::choice::Choice;
 use crate::conditions::conditions_of;
 use crate::controller::Controller;
 use crate::convert::Cube;
-use crate::error::{interruptible, raise};
+use crate::error::{interruptible, raise, warn};
 use crate::gradients::VARIABLES;
 use crate::instance;
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
 use crate::trajectory::Trajectory;
+
+/// Warns about a tick that is longer than the whole movement, or than a period.
+///
+/// It is no error: the first tick of a loop of events may be long, and a tick of any length is exact.
+pub(crate) fn warn_of_long_tick(py: Python<'_>, controller: &pdmp_core::Controller) -> PyResult<()> {
+    let (dt, primitive) = (controller.dt(), controller.primitive());
+    let duration = primitive.duration() * controller.tau() / primitive.tau();
+    if dt <= duration {
+        return Ok(());
+    }
+    let hint = if dt >= 1.0 { format!("; for a loop of {dt} Hz pass dt={}", 1.0 / dt) } else { String::new() };
+    let text =
+        format!("dt = {dt} s is longer than the movement of {duration:.4} s: a tick performs all of it at once{hint}");
+    warn(py, &text)
+}
 
 #[pymethods]
 impl Model {
@@ -53,6 +68,12 @@ impl Model {
     /// TypeError
     ///     A keyword is unknown, or `conditions` has another type.
     ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+    ///     movement.
+    ///
     /// Examples
     /// --------
     /// >>> trajectory = model.rollout(goal=[1.1, 0.0], tau=2.0, dt=0.001)
@@ -76,6 +97,16 @@ impl Model {
         let grid = TimeGrid { dt: dt.number("dt")?, duration: optional_number("duration", duration)? };
         let conditions = conditions_of(&self.0, conditions, context, changes)?;
         let trajectory = interruptible(py, |progress| rollout_with(self.0.primitive(), &conditions, grid, progress))?;
+        if trajectory.time.len() == 1 && grid.duration != Some(0.0) {
+            let TimeGrid { dt, duration } = grid;
+            let length = duration.unwrap_or(
+                self.0.duration() * conditions.time_constant(self.0.primitive()).map_err(raise)? / self.0.tau(),
+            );
+            warn(
+                py,
+                &format!("dt = {dt} s is longer than the movement of {length:.4} s: the only sample is the start"),
+            )?;
+        }
         Trajectory::new(py, trajectory, self.0.primitive())
     }
 
@@ -110,6 +141,12 @@ impl Model {
     /// TypeError
     ///     A keyword is unknown, or `conditions` or `limits` has another type.
     ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     The context lies outside the demonstrated ones by more than a tenth of their range, or `dt` is longer than the
+    ///     movement.
+    ///
     /// Examples
     /// --------
     /// >>> controller = model.controller(dt=0.01, goal=[1.0, 0.1])
@@ -139,6 +176,7 @@ impl Model {
         let conditions = conditions_of(&self.0, conditions, context, changes)?;
         let mut controller =
             pdmp_core::Controller::new(self.0.primitive(), dt, &conditions, transition).map_err(raise)?;
+        warn_of_long_tick(py, &controller)?;
         if let Some(limits) = limits {
             controller.set_limits(instance::limits(limits)?).map_err(raise)?;
         }

@@ -3,13 +3,14 @@
 use pdmp_core::Model;
 use pdmp_core::context::ContextMap;
 use pdmp_core::demonstration::ContextValue;
+use pdmp_core::model::Prediction;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyString};
 
 use crate::convert::{context, context_value, contexts, items};
-use crate::error::raise;
+use crate::error::{raise, warn};
 
 /// Context values of one movement.
 type Context = Vec<ContextValue>;
@@ -22,6 +23,39 @@ pub(crate) fn context_for(model: &Model, value: &Bound<'_, PyAny>) -> PyResult<C
         Some(values) => ordered(model.map(), &values),
         None => context("context", value),
     }
+}
+
+/// Returns the prediction for a context. A warning says that the context lies outside the demonstrated ones.
+pub(crate) fn predicted(py: Python<'_>, model: &Model, context: &[ContextValue]) -> PyResult<Prediction> {
+    let prediction = model.predict(context).map_err(raise)?;
+    warn_of_extrapolation(py, model, &[context], std::slice::from_ref(&prediction))?;
+    Ok(prediction)
+}
+
+/// Warns about the context that lies farthest outside the demonstrated ones, if by more than a tenth of their range.
+pub(crate) fn warn_of_extrapolation(
+    py: Python<'_>,
+    model: &Model,
+    contexts: &[impl AsRef<[ContextValue]>],
+    predictions: &[Prediction],
+) -> PyResult<()> {
+    let far = predictions.iter().enumerate().filter_map(|(b, prediction)| {
+        let column = prediction.far_value()?;
+        Some((b, column, prediction.extrapolation[column]))
+    });
+    let Some((b, column, distance)) = far.max_by(|one, other| one.2.total_cmp(&other.2)) else { return Ok(()) };
+    let name = model.map().and_then(|map| map.names().get(column));
+    let name = name.map_or_else(|| column.to_string(), |name| format!("{name:?}"));
+    let value = match &contexts[b].as_ref()[column] {
+        ContextValue::Number(number) => format!("{number}"),
+        ContextValue::Label(label) => format!("{label:?}"),
+    };
+    let place = if distance.is_finite() {
+        format!("lies outside the demonstrated range, by {distance:.2} times that range")
+    } else {
+        "differs from the only demonstrated value".to_string()
+    };
+    warn(py, &format!("context[{name}] = {value} {place}: the movement is an extrapolation"))
 }
 
 /// Converts a context (Q,), or contexts (B, Q). The second value is true for contexts.

@@ -1,16 +1,16 @@
 //! Partial fits of blocks of demonstrations.
 
-use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pdmp_core::FitOptions;
 use pdmp_core::learning::Stage;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::blocks::Blocks;
 use crate::choice::Choice;
-use crate::convert::Reduced;
+use crate::convert::{FilePath, Reduced};
 use crate::error::{detached, raise};
 use crate::factorised_fit::{FactorisedFit, StagedProgress};
 use crate::fit::{KINDS, SmoothingArgument, basis_of, canonical_of, demonstrations, dof_scale_of, map_of, n_styles_of};
@@ -168,8 +168,13 @@ impl PartialFit {
     /// Raises
     /// ------
     /// ValueError
-    ///     `other` has other settings.
+    ///     `other` has other settings, or is this partial fit.
     fn merge(&self, py: Python<'_>, other: &Self) -> PyResult<()> {
+        if std::ptr::eq(self, other) {
+            let text =
+                "other is this partial fit: its demonstrations would count twice; make one with `empty` for others";
+            return Err(PyValueError::new_err(text));
+        }
         // The other one is copied first: two locks could wait for each other.
         py.detach(|| {
             let other = other.locked().clone();
@@ -294,8 +299,8 @@ impl PartialFit {
     /// >>> partial.save(path)
     /// >>> pdmp.PartialFit.load(path).n_demos
     /// 1
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| self.locked().save(&path)).map_err(raise)
+    fn save(&self, py: Python<'_>, path: FilePath) -> PyResult<()> {
+        py.detach(|| self.locked().save(&path.0)).map_err(raise)
     }
 
     /// Reads a file that `save` wrote.
@@ -315,8 +320,8 @@ impl PartialFit {
     /// ModelFileError
     ///     The file is damaged, not a partial fit, or of another version.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let loaded = py.detach(|| pdmp_core::learning::PartialFit::load(&path));
+    fn load(py: Python<'_>, path: FilePath) -> PyResult<Self> {
+        let loaded = py.detach(|| pdmp_core::learning::PartialFit::load(&path.0));
         loaded.map(|partial| Self(Mutex::new(partial))).map_err(raise)
     }
 

@@ -1,14 +1,12 @@
 //! Prior distributions of the parameters of a movement.
 
-use std::path::PathBuf;
-
 use pdmp_core::inference::{BandFactors, Calibration, Mixture, Settings};
 use pdmp_core::learning::learn_prior;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyDictMethods, PyTuple};
 
-use crate::convert::{Matrix, Reduced, Vector, items, locked, matrix, quoted, read_only, threads, vector};
+use crate::convert::{FilePath, Matrix, Reduced, Vector, items, locked, matrix, quoted, read_only, threads, vector};
 use crate::error::raise;
 use crate::fit::demonstrations;
 use crate::model::Model;
@@ -87,8 +85,8 @@ impl Prior {
     /// >>> model.save(path, prior=model.prior(demos))
     /// >>> recogniser = pdmp.load(path).recogniser(pdmp.Prior.load(path))
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        py.detach(|| pdmp_core::inference::Prior::load(&path)).map(Self).map_err(raise)
+    fn load(py: Python<'_>, path: FilePath) -> PyResult<Self> {
+        py.detach(|| pdmp_core::inference::Prior::load(&path.0)).map(Self).map_err(raise)
     }
 
     /// Reads the prior from the contents of a model file.

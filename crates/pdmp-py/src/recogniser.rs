@@ -36,7 +36,8 @@ pub(crate) struct Estimate {
     duration_deviation: f64,
     /// Time of arrival at the goal in s, on the clock of the observations; None for a rhythmic movement.
     arrival: Option<f64>,
-    /// Fraction of the movement at the last observation; of the cycle, in [0, 1), for a rhythmic one.
+    /// Time from the start to the last observation over the estimated duration, more than 1 after the end of the movement;
+    /// fraction of the cycle, in [0, 1), for a rhythmic one.
     fraction: f64,
     /// Standard deviation of `fraction`.
     fraction_deviation: f64,

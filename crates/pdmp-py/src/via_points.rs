@@ -1,19 +1,17 @@
 //! Movements through points.
 
-use std::ffi::CString;
 use std::sync::Arc;
 
 use numpy::PyArray1;
 use pdmp_core::dynamics::AdditionalForcing as Forcing;
 use pdmp_core::inference::{PassageOptions, through};
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::conditions::{Conditions, own_and_predicted};
 use crate::controller::Controller;
 use crate::convert::{Reduced, Vector, items, to_numpy};
-use crate::error::raise;
+use crate::error::{raise, warn};
 use crate::instance;
 use crate::model::Model;
 use crate::scalar::{Scalar, optional_number};
@@ -205,7 +203,7 @@ impl Model {
                  1000 movements of the demonstrators would be",
                 passage.distance
             );
-            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(text)?, 1)?;
+            warn(py, &text)?;
         }
         Ok(Passage {
             conditions: Py::new(py, Conditions(passage.conditions))?,

@@ -14,6 +14,8 @@ from pdmp._messages import printable
 _RENAMED = {"contexts": "context", "demos": "demo", "n_styles": "styles"}
 
 
+_HINT = re.compile(r" \((\w+)=\)")
+
 aliases: dict[str, str] = {}
 """Names in messages of temporary files."""
 
@@ -61,11 +63,17 @@ def one_line(message: object, options: Mapping[str, str]) -> str:
     )
     # Quoted parts are values of the user.
     parts = re.split(r"""("[^"]*"|'[^']*')""", text)
+    parts[::2] = [_HINT.sub(lambda hint: _known(hint, options), part) for part in parts[::2]]
     parts[::2] = [
         argument.sub(lambda match: options["".join(filter(None, match.groups()))], part)
         for part in parts[::2]
     ]
     return "".join(parts)
+
+
+def _known(hint: re.Match[str], options: Mapping[str, str]) -> str:
+    """Returns a hint at an argument; one that no option sets is for Python alone."""
+    return hint[0] if hint[1] in options else f" ({hint[1]}= in Python)"
 
 
 @contextmanager

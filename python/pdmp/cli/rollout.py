@@ -5,7 +5,6 @@ The style is that of the nominal demonstration unless --style, --context or --de
 example: pdmp rollout reach.safetensors --context 1.45 --goal 0.4 -0.2 0.9 -o reach.csv
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import Any
@@ -59,8 +58,6 @@ def run(options: Namespace) -> None:
         if options.context is not None:
             arguments["context"] = _context(options.context)
         trajectory = model.rollout(conditions, **arguments)
-        if "context" in arguments and model.predict(arguments["context"]).extrapolation.any():
-            print("pdmp: the context lies outside the demonstrated ones", file=sys.stderr)
         trajectory.to_csv(path)
     summarise(options.output, f"{len(trajectory.time)} samples, {trajectory.time[-1]:g} s")
 

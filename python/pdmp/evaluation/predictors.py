@@ -84,7 +84,7 @@ class PDMP:
             condition = context.tolist()
             predicted = model.predict(condition)
             dt = recordings.interval(predicted.duration)
-            position = model.rollout(context=condition, dt=dt).position[:n_samples]
+            position = model.rollout(predicted.conditions, dt=dt).position[:n_samples]
             variance = None
             if predicted.covariance is not None:
                 lower, upper = model.band(condition, level=BAND, dt=dt)

@@ -26,6 +26,10 @@ class Options:
     def __post_init__(self) -> None:
         """Raises an error for options of the wrong type."""
         check_number("max_gap", self.max_gap)
+        if not float(self.max_gap) >= 0.0:
+            raise value_error(
+                f"max_gap = {float(self.max_gap):g}: must not be negative, in seconds; 0 fills none"
+            )
         if self.dt is not None:
             check_number("dt", self.dt)
         if self.columns is not None:

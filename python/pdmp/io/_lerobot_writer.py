@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._files import new_folder
+from pdmp._files import file_path, new_folder
 from pdmp._labels import name_list
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration, Trajectory
@@ -63,7 +63,7 @@ def write_lerobot(
     --------
     read_lerobot : Reads the episodes of a data set.
     """
-    path = Path(path)
+    path = file_path(path)
     listed = list(movements.values() if isinstance(movements, Mapping) else movements)
     texts = [tasks] * len(listed) if isinstance(tasks, str) else name_list("tasks", tasks)
     check_type("robot", robot, str, "the type of a robot")

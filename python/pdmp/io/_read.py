@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pdmp._files import file_path
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration
 from pdmp.io._collections import ListedDemonstrations
@@ -66,7 +69,8 @@ def read(
 def path_list(paths: str | PathLike[str] | Iterable[str | PathLike[str]]) -> list[Path]:
     """Returns one path, or several, as a list."""
     check_type("paths", paths, (str, PathLike, Iterable), "a path, or a list of them")
-    return [Path(path) for path in ([paths] if isinstance(paths, (str, PathLike)) else paths)]
+    listed = [paths] if isinstance(paths, (str, PathLike)) else list(paths)
+    return [file_path(path, f"paths[{k}]") for k, path in enumerate(listed)]
 
 
 def parts_of(
@@ -100,6 +104,8 @@ def parts_of(
             yield Part(partial(reader, path, **options), is_single=False)
         elif suffix in SINGLE:
             yield single_part(path.stem, path, time, **options)
+        elif not path.exists():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
         else:
             suffixes = ", ".join([*SINGLE, *SEVERAL])
             raise value_error(f"{path}: expected a folder or a file of one of {suffixes}")

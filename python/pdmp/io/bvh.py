@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pdmp._files import file_path
 from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
@@ -57,7 +58,7 @@ def read_bvh(
         A file that cannot be read.
     """
     Options(columns, dt, max_gap)
-    path = Path(path)
+    path = file_path(path)
     motion = _parsed(path)
     try:
         channels = [

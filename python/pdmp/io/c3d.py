@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 
+from pdmp._files import file_path
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _c3d_file
@@ -47,7 +47,7 @@ def read_c3d(
     OSError
         A file that cannot be read.
     """
-    path = Path(path)
+    path = file_path(path)
     options = Options(columns, dt, max_gap, context)
     data = path.read_bytes()
     with reading(path, "C3D"):

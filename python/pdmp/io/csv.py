@@ -5,9 +5,8 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 
-from pdmp._files import atomic_write
+from pdmp._files import atomic_write, file_path
 from pdmp._native import Demonstration, Trajectory
 from pdmp.io._demonstration import Options, check_time
 from pdmp.io._motion_capture import parse_table
@@ -60,7 +59,7 @@ def read_csv(
     OSError
         A file that cannot be read.
     """
-    path = Path(path)
+    path = file_path(path)
     check_time(time)
     options = Options(columns, dt, max_gap, context)
     return read_table(parse_table(path, time), time, options)
@@ -97,7 +96,7 @@ def write_csv(
     OSError
         A file that cannot be written, or whose folder does not exist.
     """
-    path = Path(path)
+    path = file_path(path)
     fields, columns = trajectory_table(path, trajectory, names, units)
     with atomic_write(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pdmp._files import file_path
 from pdmp._labels import name_list, split_label
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
@@ -68,7 +69,7 @@ def read_folder(
         A file that cannot be read.
     """
     options: dict[str, Any] = {"columns": columns, "dt": dt, "max_gap": max_gap}
-    parts = folder_parts(Path(path), time, context, **options)
+    parts = folder_parts(file_path(path), time, context, **options)
     demos = NamedDemonstrations(context_names=context or ())
     for part in parts:
         demos.update(part.read())

@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from itertools import chain
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pdmp._files import file_path
 from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
@@ -73,7 +73,7 @@ def read_hdf5(
     OSError
         A file that cannot be read.
     """
-    path = Path(path)
+    path = file_path(path)
     options = Options(columns, dt, max_gap)
     listed, wanted = feature_list(features), name_list("context", context or [])
     package = load("h5py", "hdf5", "HDF5 files")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdmp._files import file_path
 from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
@@ -152,7 +153,7 @@ def open_lerobot(
     context: Sequence[str],
 ) -> Episodes:
     """Reads the metadata of a data set."""
-    path = Path(path)
+    path = file_path(path)
     listed = feature_list(features)
     wanted = name_list("context", context)
     info = meta.read_info(path)

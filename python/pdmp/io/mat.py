@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdmp._files import file_path
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io import _mat_file, _time_units
@@ -65,7 +66,7 @@ def read_mat(
     OSError
         A file that cannot be read.
     """
-    path = Path(path)
+    path = file_path(path)
     options = Options(columns, dt, max_gap, context)
     data = path.read_bytes()
     if data[:19] == b"MATLAB 7.3 MAT-file":

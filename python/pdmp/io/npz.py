@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pdmp._files import file_path
 from pdmp._labels import name_list
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
@@ -50,7 +51,7 @@ def read_npz(
     Options(columns, dt, max_gap)
     return {
         name: make_demonstration(f"{path}, '{name}'", position, max_gap=max_gap, **arguments)
-        for name, position, arguments in read_recordings(Path(path), columns, dt)
+        for name, position, arguments in read_recordings(file_path(path), columns, dt)
     }
 
 

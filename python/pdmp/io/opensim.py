@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
+from pdmp._files import file_path
 from pdmp._messages import value_error
 from pdmp._native import Demonstration
 from pdmp.io._csv_layout import CsvTable, read_text
@@ -55,7 +56,7 @@ def read_opensim(
     OSError
         A file that cannot be read.
     """
-    path = Path(path)
+    path = file_path(path)
     options = Options(columns, dt, max_gap, context)
     text = read_text(path)
     table = _markers(path, text) if text[:12] == "PathFileType" else _storage(path, text)

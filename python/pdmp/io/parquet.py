@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pdmp._files import atomic_write
+from pdmp._files import atomic_write, file_path
 from pdmp._native import Demonstration, Trajectory
 from pdmp.io._demonstration import Options
 from pdmp.io._packages import load, reading
@@ -62,7 +61,7 @@ def read_parquet(
     OSError
         A file that cannot be read.
     """
-    path = Path(path)
+    path = file_path(path)
     options = Options(columns, dt, max_gap, context)
     parquet = load("pyarrow.parquet", "parquet", FILES)
     path.stat()  # a missing file is an error of the system
@@ -115,7 +114,7 @@ def write_parquet(
     OSError
         A file that cannot be written, or whose folder does not exist.
     """
-    path = Path(path)
+    path = file_path(path)
     fields, columns = trajectory_table(path, trajectory, names, units)
     arrow, parquet = load("pyarrow", "parquet", FILES), load("pyarrow.parquet", "parquet", FILES)
     arrays = [np.ascontiguousarray(column) for column in columns.T]

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pdmp._files import new_folder
+from pdmp._files import file_path, new_folder
 from pdmp._labels import name_list
 from pdmp._messages import check_type, value_error
 from pdmp._native import Demonstration, Trajectory
@@ -78,7 +78,7 @@ def read_rosbag(
     --------
     write_rosbag : Writes a trajectory as a bag.
     """
-    path = Path(path)
+    path = file_path(path)
     options = Options(columns, dt, max_gap, context)
     check_type("topic", topic, (str, type(None)), "the name of a topic")
     with _opened(path) as bag:
@@ -168,7 +168,7 @@ def write_rosbag(
     OSError
         A folder that exists, or that cannot be written.
     """
-    path = Path(path)
+    path = file_path(path)
     check_type("trajectory", trajectory, Trajectory, "pdmp.Trajectory")
     check_type("topic", topic, str, "the name of a topic")
     joints = trajectory.names if names is None else name_list("names", names)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pdmp._labels import DERIVATIVES
+from pdmp._messages import check_type
 from pdmp._native import Limits, Trajectory
 from pdmp.plot.canvas import dof_labels, draw_panels, figure_of, label_axes, legend, line_color
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
+EXPECTED = "a Trajectory, as Model.rollout returns it, or a list or dict of them"
 TITLES = ("position", "velocity", "acceleration")
 
 
@@ -87,12 +89,16 @@ def _labelled(
     """Returns trajectories of the same degrees of freedom with their labels, "" without any."""
     if isinstance(trajectories, Trajectory):
         trajectories = [trajectories]
+    check_type("trajectories", trajectories, Iterable, EXPECTED)
     if isinstance(trajectories, Mapping):
         labelled = [(str(label), trajectory) for label, trajectory in trajectories.items()]
     else:
         labelled = [("", trajectory) for trajectory in trajectories]
     if not labelled:
         raise ValueError("trajectories is empty: pass at least one")
+    for k, (label, trajectory) in enumerate(labelled):
+        name = f"trajectories[{label!r}]" if label else f"trajectories[{k}]"
+        check_type(name, trajectory, Trajectory, EXPECTED)
     expected = labelled[0][1].names
     for k, (_, trajectory) in enumerate(labelled):
         if trajectory.names != expected:

@@ -13,7 +13,7 @@ mod model_selection;
 mod names;
 mod outputs;
 mod principal_axes;
-mod stacking;
+pub(crate) mod stacking;
 #[cfg(test)]
 mod tests;
 mod training_data;

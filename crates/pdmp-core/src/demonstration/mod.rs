@@ -1,5 +1,6 @@
 //! Demonstrations: recorded movements whose shapes and numbers are checked.
 
+mod labels;
 mod rotations;
 
 use std::f64::consts::TAU;
@@ -7,6 +8,7 @@ use std::f64::consts::TAU;
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, Result};
+pub(crate) use labels::{check_labels, check_rotations};
 pub(crate) use rotations::{MAX_NORM_DEVIATION, layout, points};
 pub use rotations::{QuaternionOrder, RotationColumns};
 

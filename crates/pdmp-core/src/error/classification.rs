@@ -22,10 +22,11 @@ pub enum ErrorKind {
 }
 
 impl Error {
-    /// Returns the caller's next step; that of the inner error for one of several demonstrations.
+    /// Returns the caller's next step; that of the inner error for one of several demonstrations or movements.
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Demo { source, .. } => source.kind(),
+            Self::Movement(error) => error.source.kind(),
             Self::Rotation(error) => error.next_step(),
             Self::Memory { .. } => ErrorKind::Memory,
             Self::Fit(_) => ErrorKind::Numerical,
@@ -61,6 +62,7 @@ impl Error {
             | Self::ContextNames { .. }
             | Self::NoNumber { .. }
             | Self::Kind { .. }
+            | Self::Mismatch(_)
             | Self::Limits(_)
             | Self::Argument { .. }
             | Self::Conflict { .. } => ErrorKind::Argument,
@@ -79,6 +81,8 @@ impl Error {
     pub fn argument(&self) -> Option<&str> {
         match self {
             Self::Demo { source, .. } => source.argument(),
+            Self::Movement(error) => error.source.argument(),
+            Self::Mismatch(error) => Some(error.name),
             Self::NotFinite { name, .. }
             | Self::NotFiniteAt { name, .. }
             | Self::Length { name, .. }

@@ -18,6 +18,12 @@ pub enum LimitError {
         /// Its upper limit.
         upper: f64,
     },
+    /// Different numbers of lower and upper limits of the position.
+    #[error("limits: position has {} lower and {} upper limits: give one for each DoF, or one for all", lengths[0], lengths[1])]
+    PositionLengths {
+        /// Numbers of lower and upper limits.
+        lengths: [usize; 2],
+    },
     /// A path that leaves the limits of the position.
     #[error(
         "limits of DoF {dof}: the path reaches {value:.6} at {:.1} % of its clock, outside {lower} to {upper}; change goal or \

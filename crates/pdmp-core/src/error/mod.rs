@@ -8,6 +8,7 @@ mod classification;
 mod difference;
 mod format;
 mod limits;
+mod located;
 mod rotations;
 
 use std::path::PathBuf;
@@ -16,8 +17,7 @@ use crate::kind::Kind;
 pub use classification::ErrorKind;
 pub use difference::Difference;
 use format::{Column, Count, Gap, Number, Rounded, Times};
-pub use limits::LimitError;
-pub use rotations::RotationError;
+pub use {limits::LimitError, located::Mismatch, located::MovementError, rotations::RotationError};
 
 /// Any error of this crate.
 ///
@@ -39,6 +39,12 @@ pub enum Error {
         /// Its error.
         source: Box<Error>,
     },
+    /// An error in one of several movements.
+    #[error(transparent)]
+    Movement(Box<MovementError>),
+    /// Labels that differ from those of other demonstrations or of a model.
+    #[error(transparent)]
+    Mismatch(Box<Mismatch>),
     /// An element of a vector is NaN or infinite.
     #[error("{name}[{index}] = {}: every number must be finite", Number(*value))]
     NotFinite {

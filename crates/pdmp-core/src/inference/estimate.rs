@@ -30,7 +30,8 @@ pub struct Estimate {
     pub duration_deviation: f64,
     /// Time of arrival of a discrete movement in seconds, on the clock of the observations.
     pub arrival: f64,
-    /// Fraction of the movement, or of the cycle in [0, 1), at the last observation.
+    /// Time from the start to the last observation over the estimated duration, more than 1 after the end; of a rhythmic
+    /// movement, the fraction of the cycle in [0, 1).
     pub fraction: f64,
     /// Standard deviation of `fraction`.
     pub fraction_deviation: f64,

@@ -34,6 +34,10 @@ impl Constants {
     /// A constant out of range, or one that the kind of movement does not have.
     pub(super) fn for_duration(options: &FitOptions, duration: f64) -> Result<Self> {
         let attractor = Attractor { alpha_z: options.alpha_z, beta_z: options.beta_z.unwrap_or(options.alpha_z / 4.0) };
+        if let Some(length) = options.rotation_length {
+            let allowed = "must lie between 1e-6 and 1e6, in the unit of the positions";
+            check_range("rotation_length", length, (1e-6..=1e6).contains(&length), allowed)?;
+        }
         check_rate("alpha_z", attractor.alpha_z)?;
         check_rate("beta_z", attractor.beta_z)?;
         let (canonical, tau) = match options.canonical {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ndarray::Array2;
 
 use crate::context::{ContextColumn, ContextMap, tabulate};
-use crate::demonstration::{ContextValue, Demonstration};
+use crate::demonstration::{ContextValue, Demonstration, check_labels};
 use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -354,9 +354,10 @@ fn common_labels(
     labels: impl Fn(&Demonstration) -> Option<&[String]>,
     name: &'static str,
 ) -> Result<Option<Vec<String>>> {
-    let Some(first) = demos.iter().find_map(&labels) else { return Ok(None) };
-    match demos.iter().position(|demo| labels(demo).is_some_and(|other| other != first)) {
-        Some(m) => Err(Error::Argument { name, problem: "differ from those of the other demonstrations" }.in_demo(m)),
-        None => Ok(Some(first.to_vec())),
+    let first = demos.iter().enumerate().find_map(|(m, demo)| Some((m, labels(demo)?)));
+    let Some((owner, first)) = first else { return Ok(None) };
+    for (m, demo) in demos.iter().enumerate() {
+        check_labels(name, labels(demo), first, &format!("demo {owner}")).map_err(|error| error.in_demo(m))?;
     }
+    Ok(Some(first.to_vec()))
 }

@@ -11,7 +11,7 @@ use super::fit::labels_of;
 use super::mean_path::{Recording, mean_path};
 use super::options::{DofScaling, FitOptions};
 use super::rotation_timing::largest_distance;
-use crate::demonstration::{Demonstration, RotationColumns, points};
+use crate::demonstration::{Demonstration, RotationColumns, check_rotations, points};
 use crate::dynamics::mean_rotation::{MAX_CELLS, MeanRotation};
 use crate::error::{Error, Result, RotationError};
 use crate::model::Primitive;
@@ -19,7 +19,6 @@ use crate::model::coordinates::{Coordinates, Frame, layout};
 use crate::model::finding::Finding;
 use crate::numerics::rotation::{Quaternion, Vector, add_scaled, distance, dot, inverse, log, log_near, product};
 use crate::numerics::smoothing_spline::Smoothing;
-use crate::validate::check_range;
 
 /// Residual rotation that is reported: beyond it the residuals are distorted by a tenth or more.
 const MAX_PLAIN_RESIDUAL: f64 = std::f64::consts::FRAC_PI_2;
@@ -55,15 +54,6 @@ impl Residuals {
         let columns = demos.first().map_or(&[][..], Demonstration::rotations);
         if columns.is_empty() {
             return Ok(None);
-        }
-        if let Some(length) = options.rotation_length {
-            let valid = (1e-6..=1e6).contains(&length);
-            check_range(
-                "rotation_length",
-                length,
-                valid,
-                "must lie between 1e-6 and 1e6, in the unit of the positions",
-            )?;
         }
         let alignment = Alignment { smoothing: Smoothing::Interpolate, ..options.alignment() };
         let mut aligned = alignment.align(demos, options.threads)?;
@@ -214,8 +204,8 @@ pub(super) fn about_means(demo: &Demonstration, coordinates: &Coordinates, phase
 /// Rotations that differ between demonstrations.
 pub(super) fn vectors_of(demos: &[Demonstration]) -> Result<Vec<Range<usize>>> {
     let columns = demos.first().map_or(&[][..], Demonstration::rotations);
-    if let Some(m) = demos.iter().position(|demo| demo.rotations() != columns) {
-        return Err(Error::Argument { name: "rotations", problem: "differ from those of demo 0" }.in_demo(m));
+    for (m, demo) in demos.iter().enumerate() {
+        check_rotations(demo.rotations(), columns, "demo 0").map_err(|error| error.in_demo(m))?;
     }
     let (names, units) = labels_of(demos)?;
     let rotations = layout(names.len(), columns).1.into_iter().map(|dof| dof..dof + 3);

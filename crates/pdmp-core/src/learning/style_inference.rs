@@ -8,7 +8,7 @@ use ndarray::{Array2, ArrayView2};
 
 use super::rotations::{self, vectors_of};
 use super::{cycle_phase, rotation_timing};
-use crate::demonstration::Demonstration;
+use crate::demonstration::{Demonstration, check_labels, check_rotations};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::{Aligned, Alignment};
@@ -100,9 +100,7 @@ pub fn style_of(model: &Model, demo: &Demonstration, options: &StyleOptions) -> 
     check_length("demonstration", demo.n_coordinates(), primitive.n_coordinates(), primitive.per_coordinate())?;
     let own = [primitive.coordinate_names(), primitive.coordinate_units()];
     for (name, labels, own) in [("names", demo.names(), own[0]), ("units", demo.units(), own[1])] {
-        if labels.is_some_and(|labels| labels != own) {
-            return Err(Error::Argument { name, problem: "differ from those of the model" });
-        }
+        check_labels(name, labels, own, "the model")?;
     }
     let alignment = Alignment {
         kind: model.kind(),
@@ -142,9 +140,7 @@ fn style_about_means(
     alignment: &Alignment,
     options: &StyleOptions,
 ) -> Result<Vec<f64>> {
-    if demo.rotations() != coordinates.columns() {
-        return Err(Error::Argument { name: "rotations", problem: "differ from those of the model" });
-    }
+    check_rotations(demo.rotations(), &coordinates.columns(), "the model")?;
     let kind = inside.kind();
     let vectors = vectors_of(std::slice::from_ref(demo))?;
     let by_shape = rotation_timing::alignment(alignment, vectors);

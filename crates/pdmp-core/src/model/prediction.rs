@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use ndarray::Array2;
 
 use super::conditions::Conditions;
+use crate::context::stacking::TRANSITION as MAX_INTERPOLATED;
 use crate::context::{ContextPrediction, log_duration_jacobian};
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -27,6 +28,24 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// Returns the index of the context value that lies farthest outside its demonstrated range, if by more than a tenth of
+    /// it: beyond, the map has the weights of an extrapolation alone.
+    ///
+    /// ```
+    /// # use pdmp_core::{Demonstration, FitOptions, Kind, fit};
+    /// # fn main() -> pdmp_core::Result<()> {
+    /// # let demos: Vec<Demonstration> = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/reaches.in"));
+    /// # let contexts = (0..demos.len()).map(|m| vec![(m as f64).into()]).collect();
+    /// let model = fit(&demos, &FitOptions::new(Kind::Discrete).contexts(contexts))?;
+    /// assert_eq!([0.5, 2.1, 5.0].map(|h| model.predict(&[h]).unwrap().far_value()), [None, None, Some(0)]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn far_value(&self) -> Option<usize> {
+        let farthest = self.extrapolation.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+        farthest.filter(|(_, distance)| **distance > MAX_INTERPOLATED).map(|(column, _)| column)
+    }
+
     /// Returns the movement for the outputs predicted by the map; its duration is clamped to a range in seconds.
     ///
     /// # Errors

@@ -250,12 +250,17 @@ impl BatchConditions {
             }
         }
         let n_movements = n_movements.unwrap_or(1);
-        for b in 0..self.n_timings(n_movements) {
+        let n_timings = self.n_timings(n_movements);
+        let is_each = n_timings > 1;
+        for b in 0..n_timings {
             let one = self.timing(b);
             reject_for_kind(kind, "amplitude", kind == Kind::Discrete && one.amplitude.is_some())?;
-            one.amplitude.map_or(Ok(()), check_amplitude)?;
-            one.phase.map_or(Ok(()), |phase| check_phase(kind, phase))?;
-            one.time_constant(primitive)?;
+            let check = || {
+                one.amplitude.map_or(Ok(()), check_amplitude)?;
+                one.phase.map_or(Ok(()), |phase| check_phase(kind, phase))?;
+                one.time_constant(primitive)
+            };
+            check().map_err(|error| if is_each { error.in_movement(b) } else { error })?;
         }
         Ok(n_movements)
     }

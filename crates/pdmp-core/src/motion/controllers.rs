@@ -10,7 +10,7 @@ use crate::motion::controller::{Controller, Status};
 use crate::motion::limits::Limits;
 use crate::motion::shares::{Part, Shares, is_selected};
 use crate::numerics::threads::Threads;
-use crate::validate::{check_length, check_range};
+use crate::validate::check_length;
 
 /// Controllers of B movements of one primitive, with ticks of one length.
 ///
@@ -40,7 +40,7 @@ use crate::validate::{check_length, check_range};
 #[derive(Clone, Debug)]
 pub struct Controllers {
     /// Commands of all movements, and the state of those that are not steady.
-    controllers: Vec<Controller>,
+    pub(super) controllers: Vec<Controller>,
     /// Steady movements.
     shares: Shares,
     statuses: Vec<Status>,
@@ -50,15 +50,21 @@ impl Controllers {
     /// Starts one movement for each of `conditions`, with the tick and the transition of [`Controller::new`].
     ///
     /// # Errors
-    /// As for [`Controller::new`], or no movement.
+    /// As for [`Controller::new`], no movement, or more movements than fit into memory.
     pub fn new(
         primitive: &Arc<Primitive>,
         dt: f64,
         conditions: &[Conditions],
         transition: Option<f64>,
     ) -> Result<Self> {
-        let new = |conditions| Ok(Controller::new(primitive, dt, conditions, transition)?.with_prefetch(0.0));
-        let controllers = conditions.iter().map(new).collect::<Result<Vec<_>>>()?;
+        Self::check_memory(primitive, conditions.len())?;
+        let new = |(b, conditions)| match Controller::new(primitive, dt, conditions, transition) {
+            Ok(controller) => Ok(controller.with_prefetch(0.0)),
+            // These two are those of all movements.
+            Err(error) if matches!(error.argument(), Some("dt" | "transition")) => Err(error),
+            Err(error) => Err(error.in_movement(b)),
+        };
+        let controllers = conditions.iter().enumerate().map(new).collect::<Result<Vec<_>>>()?;
         let n = controllers.len();
         let first = controllers.first().ok_or(Error::Argument { name: "conditions", problem: "must not be empty" })?;
         let (shares, statuses) = (Shares::new(first, n, Threads::ONE), vec![Status::Working; n]);
@@ -169,11 +175,7 @@ impl Controllers {
         self.check(mask, motions)?;
         commands.check(self.len())?;
         let selected = (0..self.len()).filter(|&b| is_selected(mask, b));
-        for b in selected.clone() {
-            let controller = &self.controllers[b];
-            commands.of(b).check(controller.primitive())?;
-            commands.speed.map_or(Ok(()), |speed| controller.check_speed(speed[b]))?;
-        }
+        selected.clone().try_for_each(|b| self.check_command(b, commands))?;
         for b in selected {
             if self.shares.holds(b) && self.controllers[b].is_changed_by(&commands.of(b)) {
                 self.leave(b);
@@ -210,7 +212,9 @@ impl Controllers {
     pub fn reset(&mut self, movements: &[usize], conditions: &[Conditions]) -> Result<()> {
         check_length("conditions", conditions.len(), movements.len(), "movement")?;
         movements.iter().try_for_each(|&b| self.check_index(b))?;
-        conditions.iter().try_for_each(|conditions| conditions.complete(self.primitive()).map(drop))?;
+        for (&b, conditions) in movements.iter().zip(conditions) {
+            conditions.complete(self.primitive()).map_err(|error| error.in_movement(b))?;
+        }
         for (&b, conditions) in movements.iter().zip(conditions) {
             self.shares.release(b);
             self.controllers[b].reset(conditions)?;
@@ -351,21 +355,5 @@ impl Controllers {
     ) -> Result<()> {
         let Self { controllers, shares, statuses } = self;
         shares.advance(Part::new(controllers, statuses, mask, motions), tick)
-    }
-
-    /// Checks the lengths of a mask and of outputs.
-    fn check(&self, mask: Option<&[bool]>, motions: &Motions) -> Result<()> {
-        let (n, primitive) = (self.len(), self.primitive());
-        if let Some(mask) = mask {
-            check_length("mask", mask.len(), n, "movement")?;
-        }
-        let per_coordinate = "coordinate of each movement";
-        check_length("position", motions.position.len(), n * primitive.n_coordinates(), per_coordinate)?;
-        check_length("velocity", motions.velocity.len(), n * primitive.n_dofs(), "DoF of each movement")?;
-        check_length("acceleration", motions.acceleration.len(), n * primitive.n_dofs(), "DoF of each movement")
-    }
-
-    fn check_index(&self, b: usize) -> Result<()> {
-        check_range("movement", b as f64, b < self.len(), "must be less than the number of movements")
     }
 }

@@ -152,7 +152,7 @@ pub fn fastest(primitive: &Arc<Primitive>, limits: &Limits, conditions: &Conditi
 /// Between knots the path is that for which the law keeps the limits.
 fn follow(primitive: &Primitive, path: &SampledPath, law: &TimeLaw, dt: f64) -> Result<Trajectory> {
     check_positive("dt", dt)?;
-    let steps = step_count("duration", (law.duration() / dt).ceil() * dt, dt)?;
+    let steps = step_count(None, (law.duration() / dt).ceil() * dt, dt)?;
     let mut interval = 0;
     let [mut y, mut dy, mut ddy] = [(); 3].map(|()| vec![0.0; primitive.n_dofs()]);
     let mut before = vec![0.0; primitive.n_coordinates()];

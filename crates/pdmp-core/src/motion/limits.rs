@@ -61,6 +61,13 @@ impl Limits {
     /// A wrong length, a finite limit above 1e150 in magnitude, a lower limit that is not below the upper one, a velocity,
     /// acceleration or jerk that is not positive, or a limit of the jerk without one of the acceleration.
     pub fn check(&self, n_dofs: usize) -> Result<()> {
+        if let (Some(lower), Some(upper)) = (&self.lower, &self.upper)
+            && lower.len().min(upper.len()) > 1
+            && lower.len() != upper.len()
+        {
+            let lengths = [lower.len(), upper.len()];
+            return Err(Error::Limits(LimitError::PositionLengths { lengths }));
+        }
         let vectors = [
             ("lower", &self.lower),
             ("upper", &self.upper),

@@ -9,6 +9,7 @@ pub(crate) mod command;
 mod commands;
 pub(crate) mod controller;
 mod controllers;
+mod controllers_checks;
 pub(crate) mod fastest;
 pub(crate) mod feasibility;
 pub(crate) mod jacobian;

@@ -27,7 +27,8 @@ impl TimeGrid {
     /// Returns the number of steps.
     pub(crate) fn steps(&self, primitive: &Primitive, tau: f64) -> Result<usize> {
         check_tau(tau, primitive.tau)?;
-        step_count("duration", self.duration.unwrap_or(primitive.duration() * tau / primitive.tau), self.dt)
+        let name = self.duration.map(|_| "duration");
+        step_count(name, self.duration.unwrap_or(primitive.duration() * tau / primitive.tau), self.dt)
     }
 }
 

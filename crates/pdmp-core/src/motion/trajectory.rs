@@ -74,13 +74,22 @@ pub(crate) fn sampling_times(steps: usize, dt: f64) -> Vec<f64> {
     (0..=steps).map(|k| k as f64 * dt).collect()
 }
 
-/// Returns the number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋ of a duration with the given name; the margins keep the
-/// last sample of a duration that is a multiple of dt up to rounding.
-pub(crate) fn step_count(name: &'static str, duration: f64, dt: f64) -> Result<usize> {
+/// Returns the number of steps n = ⌊duration/dt·(1 + 1e-12) + 1e-9⌋ of a duration, with its name if it is an argument; the
+/// margins keep the last sample of a duration that is a multiple of dt up to rounding.
+pub(crate) fn step_count(name: Option<&'static str>, duration: f64, dt: f64) -> Result<usize> {
     check_positive("dt", dt)?;
-    check_range(name, duration, (0.0..f64::INFINITY).contains(&duration), "must be finite and not negative")?;
+    check_range(
+        name.unwrap_or("duration"),
+        duration,
+        (0.0..f64::INFINITY).contains(&duration),
+        "must be finite and not negative",
+    )?;
     let steps = (duration / dt * (1.0 + 1e-12) + 1e-9).floor();
-    check_range("dt", dt, steps <= MAX_STEPS, "gives more than 1e7 samples: enlarge it")?;
+    let (name, value, allowed) = match name {
+        Some(name) => (name, duration, "more than 1e7 intervals of dt: shorten it, or enlarge dt"),
+        None => ("dt", dt, "gives more than 1e7 samples: enlarge it"),
+    };
+    check_range(name, value, steps <= MAX_STEPS, allowed)?;
     Ok(steps as usize)
 }
 

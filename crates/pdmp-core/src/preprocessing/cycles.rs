@@ -8,7 +8,9 @@ use super::cycle_rotations::{self, with_matrices};
 use super::outliers::{RejectionReason, rejections};
 use super::periodicity::{period_of, traits};
 use super::resampling::check_times;
-use crate::demonstration::{Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, RotationColumns, Sampling, layout};
+use crate::demonstration::{
+    Demonstration, MIN_SAMPLES_PER_DEMONSTRATION, RotationColumns, Sampling, check_rotations, layout,
+};
 use crate::error::{Error, Result};
 use crate::numerics::statistics::median;
 use crate::preprocessing::Curve;
@@ -111,9 +113,7 @@ pub fn cycles(recordings: &[Demonstration], onsets: Option<&[Vec<f64>]>, keep: C
     let (mut nominal, mut errors) = (None, Vec::new());
     for (recording, demo) in recordings.iter().enumerate() {
         let mut segment = || {
-            if demo.rotations() != recordings[0].rotations() {
-                return Err(Error::Argument { name: "rotations", problem: "differ from those of recording 0" });
-            }
+            check_rotations(demo.rotations(), recordings[0].rotations(), "recording 0")?;
             if demo.n_coordinates() != n_dofs {
                 return Err(Error::Dofs { expected: n_dofs, found: demo.n_coordinates() });
             }

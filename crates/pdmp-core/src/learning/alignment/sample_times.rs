@@ -36,12 +36,10 @@ impl<'a> Clock<'a> {
             let extent = alignment.kind.steps(n) as f64;
             Clock { ticks: Ticks::Even { dt }, duration: extent * dt, extent }
         };
+        alignment.dt.map_or(Ok(()), |dt| check_positive("dt", dt))?;
         let mut clock = match (demo.sampling(), alignment.dt) {
             (Sampling::Uniform { dt }, _) => even(*dt),
-            (Sampling::Unknown, Some(dt)) => {
-                check_positive("dt", dt)?;
-                even(dt)
-            }
+            (Sampling::Unknown, Some(dt)) => even(dt),
             (Sampling::Unknown, None) => {
                 return Err(Error::Argument {
                     name: "dt",

@@ -2,8 +2,8 @@
 
 use ndarray::Array2;
 
-use crate::demonstration::{Demonstration, Sampling};
-use crate::error::{Error, Result};
+use crate::demonstration::{Demonstration, Sampling, check_rotations};
+use crate::error::Result;
 use crate::inference::Layout;
 use crate::kind::Kind;
 use crate::model::{Coordinates, Model};
@@ -30,9 +30,8 @@ impl Recording {
     /// Other rotations or another number of DoFs than the model has.
     pub(super) fn new(demo: &Demonstration, model: &Model, duration: f64) -> Result<Self> {
         check_length("position", demo.n_dofs(), model.n_dofs(), "DoF of the model")?;
-        if demo.rotations() != model.primitive().coordinates().map_or_else(Vec::new, Coordinates::columns) {
-            return Err(Error::Argument { name: "rotations", problem: "differ from those of the model" });
-        }
+        let columns = model.primitive().coordinates().map_or_else(Vec::new, Coordinates::columns);
+        check_rotations(demo.rotations(), &columns, "the model")?;
         let n = demo.n_samples();
         let of = |c: usize| match demo.sampling() {
             Sampling::Stamped { time } => time[c] - time[0],

@@ -324,7 +324,8 @@ impl FactorisedFit {
     }
 }
 
-fn different_blocks() -> Error {
+/// Returns the error of a pass with other blocks.
+pub(super) fn different_blocks() -> Error {
     let problem = "differ between the passes: a function of no arguments must return the same blocks at every call";
     Error::Argument { name: "blocks", problem }
 }

@@ -68,7 +68,10 @@ impl<'a> Reader<'a> {
     fn open<T: Serialize + DeserializeOwned>(kind: &str, bytes: &'a [u8]) -> Result<(T, u32, Self)> {
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(unreadable)?;
         let json = metadata.metadata().as_ref().and_then(|all| all.get(KEY));
-        let json = json.ok_or_else(|| unreadable(format!("not a {kind}")))?;
+        let is_model = metadata.metadata().as_ref().is_some_and(|all| all.contains_key("pdmp"));
+        let found =
+            if is_model { format!("a model, not a {kind}: load it as a model") } else { format!("not a {kind}") };
+        let json = json.ok_or_else(|| unreadable(found))?;
         let sealed: Sealed<T> = serde_json::from_str(json).map_err(unreadable)?;
         let found = sealed.schema;
         ensure(found == SCHEMA, &format!("version {found}, while this library reads version {SCHEMA}"))?;

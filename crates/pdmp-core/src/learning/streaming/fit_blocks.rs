@@ -1,9 +1,11 @@
 //! Fit of a sequence of blocks that can be read more than once.
 
-use super::factorised_fit::FactorisedFit;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use super::factorised_fit::{FactorisedFit, different_blocks};
 use super::partial_fit::{PartialFit, in_all};
 use super::settings::Settings;
-use crate::demonstration::Demonstration;
+use crate::demonstration::{Demonstration, Sampling};
 use crate::error::{Error, Result};
 use crate::learning::alignment::Alignment;
 use crate::learning::constants::Constants;
@@ -25,7 +27,8 @@ pub type Blocks<'a> = Box<dyn Iterator<Item = Result<Vec<Demonstration>>> + 'a>;
 ///
 /// # Errors
 /// As for [`fit`](crate::fit); options that need all demonstrations at once, which are time warps, landmarks, rotations, the
-/// number of styles by cross-validation, and contexts or periods of all demonstrations; or an error of a block.
+/// number of styles by cross-validation, and contexts or periods of all demonstrations; other demonstrations in a later pass;
+/// or an error of a block.
 ///
 /// ```
 /// # use pdmp_core::{Demonstration, FitOptions, fit};
@@ -44,11 +47,12 @@ pub fn fit_blocks<'a>(
     options: &FitOptions,
     progress: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<Model> {
-    let (partial, noise) = first_pass(blocks, options, progress)?;
+    let mut passes = Passes { blocks, first: Vec::new(), is_repeated: false };
+    let (partial, noise) = first_pass(&mut passes, options, progress)?;
     let partial = PartialFit { settings: partial.settings.with_noise(&noise), ..partial };
     let factorised = partial.factorise(options, progress)?;
     drop(partial);
-    factorised.finish_blocks(blocks(), progress)
+    factorised.finish_blocks(passes.next(), progress)
 }
 
 impl FactorisedFit {
@@ -93,23 +97,69 @@ impl FactorisedFit {
     }
 }
 
+/// Passes over the blocks, each of which must yield the demonstrations of the first.
+struct Passes<'f, 'a> {
+    blocks: &'f mut dyn FnMut() -> Blocks<'a>,
+    /// Hash of each demonstration of the first pass.
+    first: Vec<u64>,
+    /// True from the second pass on.
+    is_repeated: bool,
+}
+
+impl Passes<'_, '_> {
+    /// Begins a pass. It ends with an error where it differs from the first.
+    fn next(&mut self) -> Blocks<'_> {
+        let (is_repeated, mut blocks, mut index) = (self.is_repeated, (self.blocks)(), 0);
+        self.is_repeated = true;
+        let first = &mut self.first;
+        Box::new(std::iter::from_fn(move || {
+            let Some(block) = blocks.next() else {
+                let is_short = is_repeated && index < first.len();
+                index = first.len();
+                return is_short.then(|| Err(different_blocks()));
+            };
+            if let Ok(block) = &block {
+                let hashes = block.iter().map(hash);
+                if !is_repeated {
+                    first.extend(hashes);
+                } else if !first[index..].iter().take(block.len()).copied().eq(hashes) {
+                    return Some(Err(different_blocks()));
+                }
+                index += block.len();
+            }
+            Some(block)
+        }))
+    }
+}
+
+/// Returns a hash of the samples of a demonstration.
+fn hash(demo: &Demonstration) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    demo.position().dim().hash(&mut hasher);
+    demo.position().iter().for_each(|x| x.to_bits().hash(&mut hasher));
+    if let Sampling::Stamped { time } = demo.sampling() {
+        time.iter().for_each(|t| t.to_bits().hash(&mut hasher));
+    }
+    hasher.finish()
+}
+
 /// Returns the partial fit of all blocks with the settings that suit them, and their noise.
-fn first_pass<'a>(
-    blocks: &mut dyn FnMut() -> Blocks<'a>,
+fn first_pass(
+    passes: &mut Passes,
     options: &FitOptions,
     progress: &mut dyn FnMut(Stage, f64) -> Result<()>,
 ) -> Result<(PartialFit, Noise)> {
-    let (mut partial, survey) = survey(blocks(), options, progress)?;
+    let (mut partial, survey) = survey(passes.next(), options, progress)?;
     let settings = survey.settings(options)?;
     let noise = settings.noise();
     let n_demos = survey.durations.len();
     if !partial.as_ref().is_some_and(|partial| partial.settings.converts_as(&settings)) {
-        partial = Some(fit_all(blocks(), settings, n_demos, options, progress)?);
+        partial = Some(fit_all(passes.next(), settings, n_demos, options, progress)?);
     }
     let partial = partial.ok_or(Error::NoDemonstrations)?;
     match partial.suitable_settings(options) {
         None => Ok((partial, noise)),
-        Some(settings) => Ok((fit_all(blocks(), settings, n_demos, options, progress)?, noise)),
+        Some(settings) => Ok((fit_all(passes.next(), settings, n_demos, options, progress)?, noise)),
     }
 }
 

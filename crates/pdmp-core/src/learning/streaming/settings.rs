@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use crate::demonstration::{ContextValue, Demonstration, Sampling, turn_of};
+use crate::demonstration::{ContextValue, Demonstration, Sampling, check_labels, turn_of};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::output_system::Attractor;
 use crate::error::{Error, Result};
@@ -166,10 +166,7 @@ impl Settings {
                 return Err(Error::Dofs { expected: self.n_dofs(), found: demo.n_coordinates() }.in_demo(m));
             }
             for (name, labels, own) in [("names", demo.names(), &self.names), ("units", demo.units(), &self.units)] {
-                if labels.is_some_and(|labels| labels != own) {
-                    let problem = "differ from those of the other demonstrations";
-                    return Err(Error::Argument { name, problem }.in_demo(m));
-                }
+                check_labels(name, labels, own, "the first block").map_err(|error| error.in_demo(m))?;
             }
         }
         if self.reference.is_empty() {

@@ -13,15 +13,20 @@ const MAX_ENTRIES: usize = 64;
 /// Maximum size of a header outside of JSON strings, in bytes: that of a model with 200,000 labels.
 const MAX_STRUCTURE: usize = 1 << 20;
 
-/// Metadata with its only key.
+/// Metadata with the only key of a model, or that of a part of a fit of blocks.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Metadata {
-    pdmp: String,
+    pdmp: Option<String>,
+    #[serde(rename = "pdmp-partial")]
+    partial: Option<IgnoredAny>,
 }
 
-/// Constants in a header, as JSON text.
-struct Header(Option<String>);
+/// Constants in a header, as JSON text, and whether it is that of a part of a fit of blocks.
+struct Header {
+    json: Option<String>,
+    is_partial: bool,
+}
 
 impl<'de> Deserialize<'de> for Header {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
@@ -34,7 +39,7 @@ impl<'de> Deserialize<'de> for Header {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Header, A::Error> {
-                let (mut json, mut count) = (None, 0);
+                let (mut json, mut is_partial, mut count) = (None, false, 0);
                 while let Some(key) = map.next_key::<String>()? {
                     count += 1;
                     if count > MAX_ENTRIES {
@@ -42,11 +47,15 @@ impl<'de> Deserialize<'de> for Header {
                     }
                     if key != "__metadata__" {
                         map.next_value::<IgnoredAny>()?;
-                    } else if json.replace(map.next_value::<Metadata>()?.pdmp).is_some() {
+                        continue;
+                    }
+                    let Metadata { pdmp, partial } = map.next_value()?;
+                    if json.is_some() || is_partial {
                         return Err(A::Error::custom("metadata twice"));
                     }
+                    (json, is_partial) = (pdmp, partial.is_some());
                 }
-                Ok(Header(json))
+                Ok(Header { json, is_partial })
             }
         }
         deserializer.deserialize_map(Entries)
@@ -59,7 +68,9 @@ pub(super) fn constants(bytes: &[u8]) -> Result<String> {
     let (head, rest) = bytes.split_first_chunk().ok_or(unreadable("shorter than a header"))?;
     let length = usize::try_from(u64::from_le_bytes(*head)).map_err(|_| unreadable("not a safetensors file"))?;
     let header = rest.get(..length).ok_or(unreadable("truncated: it ends within its header"))?;
-    let Header(json) = serde_json::from_slice(header).map_err(|error| unreadable(format!("header: {error}")))?;
+    let read = serde_json::from_slice(header).map_err(|error| unreadable(format!("header: {error}")));
+    let Header { json, is_partial } = read?;
+    ensure(!is_partial, "a partial fit, not a model: load it as a partial fit")?;
     let json = json.ok_or(unreadable("no pdmp metadata"))?;
     let structure = header.len() - json.len().min(header.len()) + structure(&json);
     ensure(structure <= MAX_STRUCTURE, "a header larger than any model has")?;

@@ -66,7 +66,7 @@ impl Controller {
         progress: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<Trajectory> {
         let dt = dt.unwrap_or(self.dt);
-        let steps = step_count("horizon", horizon, dt)?;
+        let steps = step_count(Some("horizon"), horizon, dt)?;
         self.check_tick_length(dt, None)?;
         let mut controller = self.clone();
         let tick = Command { dt: Some(dt), ..Command::default() };

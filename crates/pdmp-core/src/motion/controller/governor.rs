@@ -128,12 +128,8 @@ impl Controller {
         let Some(governor) = &mut self.governor else { return };
         governor.pending = false;
         let rate = first_element(self.rate.value());
-        let admitted = match self.conditions.velocity {
-            None => rate.min(governor.ahead.largest_square().sqrt()),
-            Some(_) if self.speed.is_infinite() => self.conditions.tau.recip(),
-            Some(_) => rate,
-        };
-        if admitted < rate {
+        let admitted = governor.ahead.largest_square().sqrt();
+        if self.conditions.velocity.is_none() && admitted < rate {
             self.rate.start(admitted, &self.rate_gains);
             self.read_out();
         }

@@ -147,6 +147,10 @@ impl Controller {
     /// Sets the speed, a factor of the rate 1/τ: 1 by default, 0 for a pause on the path. The change is filtered as that of
     /// τ. Infinity is as fast as limits of velocity and acceleration allow ([`Controller::set_limits`]). The speed remains in force after [`Controller::reset`].
     ///
+    /// A movement that starts with a given velocity ẏ keeps it at any speed, also in a pause: ẏ = ρy′ with a rate ρ at the start
+    /// of at least max |ẏ|T/(k·range), k = 15/8 for a discrete and π for a rhythmic movement, up to 1/τ. From there the rate
+    /// passes the filter to that of the speed, within the limits.
+    ///
     /// ```
     /// # use pdmp_core::{Conditions, Controller, Demonstration, FitOptions, Kind, fit};
     /// # fn main() -> pdmp_core::Result<()> {
@@ -262,7 +266,12 @@ impl Controller {
 
     /// Returns the commanded rate: speed/τ, or that of an unlimited speed.
     pub(super) fn commanded_rate(&self) -> f64 {
-        if self.speed.is_infinite() { MAX_SPEED / self.primitive.tau() } else { self.speed / self.conditions.tau }
+        self.rate_at(self.conditions.tau)
+    }
+
+    /// Returns the rate of the speed for the time constant `tau`, or that of an unlimited speed.
+    pub(super) fn rate_at(&self, tau: f64) -> f64 {
+        if self.speed.is_infinite() { MAX_SPEED / self.primitive.tau() } else { self.speed / tau }
     }
 
     /// Checks and applies a command.

@@ -1,5 +1,6 @@
 //! Start of a movement.
 
+use super::group::Group;
 use super::step::first_element;
 use super::{Controller, Status};
 use crate::dynamics::canonical::CompensatedSum;
@@ -7,8 +8,13 @@ use crate::dynamics::output_system::State;
 use crate::error::Result;
 use crate::kind::Kind;
 use crate::model::conditions::Conditions;
+use crate::motion::perturbation::largest_range;
 use crate::numerics::simd::{F64x4, WIDTH, padded, repack};
 
+/// Peak velocity of a movement of minimum jerk, relative to range / duration.
+const MINIMUM_JERK_PEAK: f64 = 1.875;
+/// Peak velocity of a sine, relative to range / period.
+const SINE_PEAK: f64 = std::f64::consts::PI;
 /// Rounding error of a velocity at the start, relative to it and to that of one range per τ.
 const ROUNDING: f64 = 1e-9;
 
@@ -96,6 +102,29 @@ impl Controller {
         }
     }
 
+    /// Returns the rate ρ at the start of a movement with the time constant `tau`: that of the speed, but for a given velocity
+    /// ẏ = ρy′ no less than the rate at which it is as large as the peak of a smooth movement over the demonstrated range, up to
+    /// 1/τ.
+    ///
+    /// At a lower rate y′ would exceed that of every movement, without bound in a pause, and with it the way to rest and the
+    /// velocity once the speed rises again. The rate then falls to that of the speed as after a change of it.
+    pub(super) fn initial_rate(&self, tau: f64) -> f64 {
+        let Some(velocity) = &self.conditions.velocity else { return self.rate_at(tau) };
+        if self.speed.is_infinite() {
+            return tau.recip();
+        }
+        let largest = largest_range(self.primitive.ranges());
+        let extent = self.primitive.duration() / self.primitive.tau();
+        let peak = if self.primitive.kind() == Kind::Discrete { MINIMUM_JERK_PEAK } else { SINE_PEAK };
+        let share = |(group, velocity): (&Group, &[f64])| {
+            let length = group.length_at(F64x4::ZERO, largest);
+            let shares = padded(velocity).abs() * (extent * peak.recip()) / length;
+            shares.to_array().into_iter().fold(0.0, f64::max)
+        };
+        let least = self.groups.iter().zip(velocity.chunks(WIDTH)).map(share).fold(0.0, f64::max);
+        self.rate_at(tau).max(least.min(tau.recip()))
+    }
+
     /// Sets position and z at the start: z = 0 for a discrete movement, the limit cycle of the style for a rhythmic one.
     fn set_initial_state(&mut self) {
         let Self { primitive, conditions, r, .. } = self;
@@ -115,12 +144,12 @@ impl Controller {
             self.clock = CompensatedSum::at(phase);
             self.read_forcing();
         }
-        // The rate at the start is that of the speed; a movement at an unlimited speed starts at that of τ, as one in a pause.
-        let tau = if self.speed > 0.0 && self.speed.is_finite() {
-            self.conditions.tau / self.speed
-        } else {
-            self.conditions.tau
-        };
+        let rate = self.initial_rate(self.conditions.tau);
+        if rate != self.commanded_rate() {
+            self.rate.start(rate, &self.rate_gains);
+        }
+        // Without motion along the path, the rate of τ stands for one of zero.
+        let tau = if rate > 0.0 { rate.recip() } else { self.conditions.tau };
         let Self { conditions, r, .. } = self;
         if let Some(start) = &conditions.start {
             repack(&mut self.position, start);

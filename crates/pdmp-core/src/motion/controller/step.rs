@@ -17,11 +17,14 @@ const MAX_TICK: f64 = 1000.0;
 impl Controller {
     /// Checks that a tick is not too long for the present rate and the commanded one.
     pub(in crate::motion) fn check_tick_length(&self, dt: f64, tau: Option<f64>) -> Result<()> {
-        let commanded = tau.map_or(first_element(self.rate.target()), |tau| {
-            if self.speed.is_infinite() { self.commanded_rate() } else { self.speed / tau }
-        });
-        let at_once = !self.started || self.command_gains.is_immediate();
-        let max_rate = if at_once { commanded } else { commanded.max(first_element(self.rate.value())) };
+        let commanded = tau.map_or(first_element(self.rate.target()), |tau| self.rate_at(tau));
+        let max_rate = if !self.started {
+            commanded.max(self.initial_rate(tau.unwrap_or(self.conditions.tau)))
+        } else if self.command_gains.is_immediate() {
+            commanded
+        } else {
+            commanded.max(first_element(self.rate.value()))
+        };
         if dt * max_rate > MAX_TICK {
             return Err(Error::Range { name: "dt", value: dt, allowed: "must not exceed 1000 tau" });
         }
