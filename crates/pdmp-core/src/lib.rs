@@ -85,7 +85,7 @@ mod random;
 mod validate;
 
 pub use demonstration::{Demonstration, Sampling};
-pub use error::{Difference, Error, ErrorKind, LimitError, Mismatch, MovementError, Result, RotationError};
+pub use error::{Error, ErrorKind, LimitError, Mismatch, MovementError, Result, RotationError};
 pub use kind::Kind;
 #[cfg(feature = "learning")]
 pub use learning::{FitOptions, fit};

@@ -272,13 +272,14 @@ fn a_prior_is_learnt_from_the_demonstrations_of_the_fit() {
         ] {
             let Error::Demo { demo, source } = error(&given) else { panic!("{}", error(&given)) };
             assert!(first.is_none_or(|first| demo == first), "{demo}: {source}");
-            let Error::OtherDemonstration(ref found) = *source else { panic!("{source}") };
-            assert!(["duration", "start", "goal", "anchor", "style"].contains(&found.name), "{source}");
-            assert!((found.found - found.expected).abs() > 1e-3 * found.expected.abs(), "{source}");
+            let Error::Mismatch(ref mismatch) = *source else { panic!("{source}") };
+            assert!(["duration", "start", "goal", "anchor", "style"].contains(&mismatch.name), "{source}");
+            let [found, expected] = [&mismatch.found, &mismatch.expected].map(|x| x.parse::<f64>().unwrap());
+            assert!((found - expected).abs() > 1e-3 * expected.abs(), "{source}");
         }
         let named = demos[0].clone().with_units(vec!["deg".to_string(); model.n_dofs()]).unwrap();
         let renamed: Vec<_> = std::iter::once(named).chain(demos[1..].iter().cloned()).collect();
-        assert!(error(&renamed).to_string().contains("units differ"), "{}", error(&renamed));
+        assert!(error(&renamed).to_string().contains("units[0] = \"deg\", but the model has"), "{}", error(&renamed));
 
         let prior = learn_prior(&model, &demos, None, Threads::ONE).unwrap();
         let digits = |y: f64| (1e4 * y).round() / 1e4;

@@ -44,8 +44,7 @@ impl Error {
             | Self::Dofs { .. }
             | Self::Mixed { .. }
             | Self::Undescribed { .. }
-            | Self::StyleSize { .. }
-            | Self::OtherDemonstration(_) => ErrorKind::Data,
+            | Self::StyleSize { .. } => ErrorKind::Data,
             Self::NotFinite { .. }
             | Self::Length { .. }
             | Self::Name { .. }
@@ -102,7 +101,6 @@ impl Error {
             Self::Segments { .. } => Some("n_segments"),
             Self::Samples { .. } | Self::Dofs { .. } => Some("position"),
             Self::NoDemonstrations => Some("demos"),
-            Self::OtherDemonstration(_) => Some("demonstrations"),
             Self::Styles { .. } => Some("n_styles"),
             Self::Label { .. } | Self::NoNumber { .. } | Self::ContextNames { .. } => Some("context"),
             Self::Mixed { .. } => Some("contexts"),

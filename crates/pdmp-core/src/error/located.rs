@@ -1,6 +1,7 @@
 //! Errors in one of several movements, and labels of demonstrations that differ.
 
 use super::Error;
+use super::format::Rounded;
 
 /// Error in one of several movements that are computed together.
 #[derive(Debug, thiserror::Error)]
@@ -12,7 +13,7 @@ pub struct MovementError {
     pub source: Error,
 }
 
-/// Names, units or rotations that differ from those of other demonstrations or of a model.
+/// Names, units, rotations or numbers that differ from those of other demonstrations, of a model or of a fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name}{} = {found}, but {of} has {expected}: {remedy}", index.map_or(String::new(), |index| format!("[{index}]")))]
 pub struct Mismatch {
@@ -31,6 +32,13 @@ pub struct Mismatch {
 }
 
 impl Error {
+    /// Returns the error of a number of a demonstration that differs from that of the fit.
+    pub(crate) fn other_demonstration(name: &'static str, index: Option<usize>, [found, expected]: [f64; 2]) -> Self {
+        let [found, expected] = [found, expected].map(|x| Rounded(x).to_string());
+        let remedy = "pass the demonstrations of the fit, in their order and unit";
+        Self::Mismatch(Box::new(Mismatch { name, index, found, expected, of: "the fit".into(), remedy }))
+    }
+
     /// Names the movement in which this error arose.
     pub(crate) fn in_movement(self, movement: usize) -> Self {
         Self::Movement(Box::new(MovementError { movement, source: self }))

@@ -5,7 +5,6 @@
 //! allocates.
 
 mod classification;
-mod difference;
 mod format;
 mod limits;
 mod located;
@@ -15,7 +14,6 @@ use std::path::PathBuf;
 
 use crate::kind::Kind;
 pub use classification::ErrorKind;
-pub use difference::Difference;
 use format::{Column, Count, Gap, Number, Rounded, Times};
 pub use {limits::LimitError, located::Mismatch, located::MovementError, rotations::RotationError};
 
@@ -353,9 +351,6 @@ pub enum Error {
         /// Its size over the largest of the demonstrations'.
         ratio: f64,
     },
-    /// A demonstration other than that of the fit with its index.
-    #[error("not that of the fit with this index: {0}; pass the demonstrations of the fit, in their order and unit")]
-    OtherDemonstration(Difference),
     /// Limits of a robot that are wrong, that a path leaves, or that no tick can keep.
     #[error(transparent)]
     Limits(LimitError),

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
+use crate::demonstration::check_labels;
 use crate::demonstration::{Demonstration, Sampling};
-use crate::error::{Difference, Error, Result};
+use crate::error::{Error, Result};
 use crate::kind::Kind;
 use crate::learning::alignment::Alignment;
 use crate::learning::rotations::about_means;
@@ -70,15 +71,11 @@ pub(super) fn fitted(model: &Model, demos: &[Demonstration], threads: Threads) -
 /// Other names or units than those of the model, or another duration than in the fit.
 fn bare(model: &Model, m: usize, demo: &Demonstration) -> Result<Demonstration> {
     let own = [model.primitive().coordinate_names(), model.primitive().coordinate_units()];
-    for (name, labels, own) in [("names", demo.names(), own[0]), ("units", demo.units(), own[1])] {
-        if labels.is_some_and(|labels| labels != own) {
-            return Err(Error::Argument { name, problem: "differ from those of the model" });
-        }
-    }
+    check_labels("names", demo.names(), own[0], "the model")?;
+    check_labels("units", demo.units(), own[1], "the model")?;
     let expected = model.demonstrated().durations[m];
     let n_steps = model.kind().steps(demo.n_samples()) as f64;
-    let other =
-        |found: f64| Err(Error::OtherDemonstration(Difference { name: "duration", index: None, found, expected }));
+    let other = |found: f64| Err(Error::other_demonstration("duration", None, [found, expected]));
     let sampling = match demo.sampling() {
         Sampling::Unknown => Sampling::Uniform { dt: expected / n_steps },
         known => known.clone(),
@@ -129,8 +126,7 @@ fn check_positions(name: &'static str, found: &Array2<f64>, expected: &Array2<f6
         let expected = expected[[m, d]];
         let range = ranges[d].max(MAX_DIFFERENCE * widest);
         if (found - expected).abs() > MAX_DIFFERENCE * range.max(MAX_DIFFERENCE * expected.abs()) {
-            let difference = Difference { name, index: Some(d), found, expected };
-            return Err(Error::OtherDemonstration(difference).in_demo(m));
+            return Err(Error::other_demonstration(name, Some(d), [found, expected]).in_demo(m));
         }
     }
     Ok(())
@@ -157,9 +153,8 @@ fn check_styles(forcing: ArrayView2<f64>, styles: &Array2<f64>, singular_values:
     let difference = differences.row(farthest);
     let by_size = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
     let j = (0..sizes.len()).max_by(by_size).unwrap_or_default();
-    let (found, expected) = (found[[farthest, j]] / sizes[j], styles[[farthest, j]]);
-    let difference = Difference { name: "style", index: Some(j), found, expected };
-    Err(Error::OtherDemonstration(difference).in_demo(farthest))
+    let numbers = [found[[farthest, j]] / sizes[j], styles[[farthest, j]]];
+    Err(Error::other_demonstration("style", Some(j), numbers).in_demo(farthest))
 }
 
 /// Returns orthonormal rows (J, N) of the same spans as the first rows of a matrix, and 0 for rows that are not longer than
