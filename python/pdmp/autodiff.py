@@ -55,8 +55,7 @@ def torch_rollouts(
         asked for, of the shapes of `Model.rollouts`.
         The gradient with respect to a unit quaternion q is that of the function of q/|q|,
         orthogonal to q. Gradients with respect to `tau` hold at fixed times, for accelerations as
-        in `Model.jacobian`, and without those of rotations. Second derivatives are not
-        available.
+        in `Model.jacobian`, but not for those of rotations. Second derivatives are not available.
 
     Raises
     ------
@@ -140,8 +139,8 @@ def jax_rollouts(
         asked for, of the shapes of `Model.rollouts`.
         The gradient with respect to a unit quaternion q is that of the function of q/|q|,
         orthogonal to q. Gradients with respect to `tau` hold at fixed times, for accelerations as
-        in `Model.jacobian`, and without those of rotations. Second and forward derivatives
-        are not available.
+        in `Model.jacobian`, but not for those of rotations. Second and forward derivatives are not
+        available.
 
     Raises
     ------

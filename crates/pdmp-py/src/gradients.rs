@@ -69,8 +69,8 @@ impl Model {
     /// ------
     /// ValueError
     ///     An argument that `rollouts` rejects; cotangents of another shape, or not finite; a condition of the other kind of
-    ///     primitive; a velocity or start of which there is none to differentiate by; tau with `segment_durations`, which
-    ///     are given in place of it; or tau with accelerations of a model with rotations.
+    ///     primitive; a velocity or start of which there is none to differentiate by; or tau with `segment_durations`, which
+    ///     are given in place of it, or with accelerations of a model with rotations.
     /// TypeError
     ///     As in `rollouts`.
     ///

@@ -12,7 +12,8 @@
 //! with the unit responses of `unit_responses` and, for k = 2, the third derivative of the movement (`third_derivative` of the
 //! controller). The loops are those of `superposition`, transposed: no Jacobian is formed.
 //! Movements that differ in τ, in phase or in segment durations have no responses in common; the products of each are those of
-//! `transposed_rollout`.
+//! `transposed_rollout`. With rotations, cotangents are converted to the degrees of freedom first, and gradients by positions and
+//! velocities back to coordinates (`batch_poses`).
 
 use std::ops::Range;
 
@@ -71,8 +72,8 @@ impl Batch {
     ///
     /// # Errors
     /// A range beyond the batch; cotangents of another number or shape, or that are not finite; a variable of the other
-    /// kind of primitive, or a velocity or start that the batch does not have; τ with segment durations, or with accelerations of
-    /// rotations; or the error of `progress`.
+    /// kind of primitive, or a velocity or start that the batch does not have; τ with segment durations, or with accelerations
+    /// of rotations; or the error of `progress`.
     pub fn vector_jacobian(
         &self,
         movements: Range<usize>,
@@ -96,12 +97,11 @@ impl Batch {
             true => (0..n_samples).flat_map(|k| std::iter::repeat_n(k as f64 * self.dt, n_dofs)).collect(),
             false => Vec::new(),
         };
-        // With rotations, the products of a change of τ are those in coordinates.
-        let by_tau = by_tau && self.poses.is_none();
         let by_accelerations = by_tau && cotangents.len() > 2 && self.singles.is_none();
         let third = by_accelerations
             .then(|| third_derivatives(&self.primitive, &self.responses, self.tau, self.forcing.as_ref(), self.dt));
-        let work = Contraction { batch: self, time, by_tau, third: third.transpose()? };
+        // With rotations, the products of a change of τ are those in coordinates.
+        let work = Contraction { batch: self, time, by_tau: by_tau && self.poses.is_none(), third: third.transpose()? };
         let in_block = (BLOCK / (n_samples * n_dofs)).max(MIN_MOVEMENTS_PER_BLOCK);
         let mut outputs: Vec<_> =
             gradients.iter_mut().map(|rows| rows.axis_chunks_iter_mut(Axis(0), in_block)).collect();
