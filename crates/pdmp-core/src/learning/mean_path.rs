@@ -129,8 +129,9 @@ fn noise_of(recordings: &[Recording], kind: Kind, smoothing: Smoothing, threads:
     let pool: Vec<_> = pooled(recordings.len()).map(|m| recordings[m].components(kind)).collect();
     let samples: Vec<Samples> =
         pool.iter().map(|(time, period, values)| Samples { time, period: *period, values: values.view() }).collect();
-    let components = [0..4];
-    Noise::estimate(smoothing, &samples, &components, MIN_DECIMATED, threads)?.with_ends(&samples, &components, threads)
+    let components = 0..4;
+    let vectors = std::slice::from_ref(&components);
+    Noise::estimate(smoothing, &samples, vectors, MIN_DECIMATED, threads)?.with_ends(&samples, vectors, threads)
 }
 
 /// Brings a path to rest at its end, with changes near the end that are proportional to its velocity and acceleration there.
