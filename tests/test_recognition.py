@@ -288,7 +288,7 @@ def test_a_model_file_keeps_the_prior(model, demos, prior, tmp_path):
 
 def test_a_prior_needs_the_demonstrations_of_the_fit(model, demos):
     """Another order or unit is named with its numbers; single precision and blocks are the same."""
-    with pytest.raises(ValueError, match=r"demo 0: .* but the fit has .*of the fit, in their order"):
+    with pytest.raises(ValueError, match=r"demo 0: .* but the fit has .*of the fit, in"):
         model.prior(demos[::-1])
     for factor in (-2.0, 57.3):
         scaled = [pdmp.Demonstration(factor * demo.position, time=demo.time) for demo in demos]
