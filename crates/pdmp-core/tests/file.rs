@@ -3,17 +3,21 @@
 #![allow(missing_docs)]
 
 mod common;
+#[path = "common/random.rs"]
+mod random;
 
 use std::sync::{Arc, LazyLock};
 
 use common::*;
+use ndarray::Array2;
 use pdmp_core::inference::{Prior, Recogniser, Timing};
 use pdmp_core::learning::learn_prior;
 use pdmp_core::motion::TimeGrid;
 use pdmp_core::numerics::Threads;
 use pdmp_core::rollout;
-use pdmp_core::{Conditions, Demonstration, Error, Kind, Model};
+use pdmp_core::{Conditions, Demonstration, Error, FitOptions, Kind, Model, Sampling};
 use proptest::prelude::*;
+use random::Random;
 
 static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| learn(&reaches(), &options(Kind::Discrete)).to_bytes().unwrap());
 static WITH_PRIOR: LazyLock<Vec<u8>> = LazyLock::new(|| {
@@ -53,6 +57,24 @@ fn a_loaded_model_moves_like_the_saved_one() {
         assert_eq!(model.to_bytes().unwrap(), loaded.to_bytes().unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file is left");
     }
+}
+
+/// The cut-offs of noisy recordings and their ends at rest are kept.
+#[test]
+fn a_file_keeps_the_treatment_of_noise() {
+    let (mut random, steps) = (Random(4), 120);
+    let mut recording = |size: f64| {
+        let position = Array2::from_shape_fn((steps + 1, 1), |(c, _)| {
+            let noise = (0..12).map(|_| random.next() - 0.5).sum::<f64>();
+            size * (std::f64::consts::FRAC_PI_2 * c as f64 / steps as f64).sin() + 0.01 * noise
+        });
+        Demonstration::new(position, Sampling::Uniform { dt: 0.01 }).unwrap()
+    };
+    let demos: Vec<_> = [0.8, 0.9, 1.0, 1.1, 1.2].map(&mut recording).into();
+    let model = learn(&demos, &FitOptions::new(Kind::Discrete));
+    assert_eq!(model.learnt().noise.ends(), [[false, true]]);
+    let loaded = Model::from_bytes(&model.to_bytes().unwrap()).unwrap();
+    assert_eq!(model.learnt(), loaded.learnt());
 }
 
 /// A prior is kept in the file of its model, bit for bit, and both are read from it.

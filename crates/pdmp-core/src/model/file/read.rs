@@ -104,7 +104,7 @@ impl Reader<'_> {
         let [levels, cut_offs] = [self.array("noise.levels", &[n_dofs])?, self.array("noise.cut_offs", &[n_dofs])?];
         ensure(!levels.iter().chain(&cut_offs).any(|x| *x < 0.0), "a noise or cut-off is negative")?;
         let cut_offs = cut_offs.into_iter().map(|hz| Some(hz).filter(|hz| *hz > 0.0)).collect();
-        // Earlier files have natural ends.
+        // The array of a model without ends at rest is left out.
         let ends = match self.tensors.tensor("noise.ends") {
             Ok(_) => self.matrix("noise.ends", (n_dofs, 2))?,
             Err(_) => Array2::zeros((n_dofs, 2)),

@@ -11,6 +11,7 @@ use crate::context::{ContextMap, MapParameters, StackingWeights};
 use crate::dynamics::hermite_table::KnotTable;
 use crate::error::Result;
 use crate::model::{Coordinates, Model};
+use crate::numerics::smoothing_spline::NATURAL;
 
 /// Array of a file: its name, shape and elements by rows.
 type Array = (&'static str, Vec<usize>, Vec<f64>);
@@ -87,7 +88,6 @@ impl Model {
         let knots = vec![self.forcing_table.cells() + 1, self.n_styles(), self.n_dofs()];
         // 0 stands for interpolation without smoothing.
         let cut_offs: Vec<f64> = self.learnt.noise.cut_offs().iter().map(|hz| hz.unwrap_or(0.0)).collect();
-        let ends = self.learnt.noise.ends().iter().flatten().map(|&rest| f64::from(u8::from(rest))).collect();
         let mut arrays = vec![
             matrix("styles", &demonstrated.styles),
             matrix("goals", &demonstrated.goals),
@@ -100,11 +100,15 @@ impl Model {
             vector("ranges", &self.ranges),
             vector("noise.levels", self.learnt.noise.levels()),
             vector("noise.cut_offs", &cut_offs),
-            ("noise.ends", vec![self.n_dofs(), 2], ends),
             vector("transport", self.transport.coefficients()),
             ("forcing_table.values", knots.clone(), values),
             ("forcing_table.slopes", knots, slopes),
         ];
+        let ends = self.learnt.noise.ends();
+        if ends.iter().any(|rest| *rest != NATURAL) {
+            let numbers = ends.iter().flatten().map(|is_at_rest| f64::from(u8::from(*is_at_rest))).collect();
+            arrays.push(("noise.ends", vec![ends.len(), 2], numbers));
+        }
         if let Some(coordinates) = self.coordinates() {
             let knots: Vec<_> = coordinates.rotations().iter().map(|rotation| rotation.mean.knots()).collect();
             let shape = vec![knots.len(), knots.first().map_or(0, |knots| knots.len()), 4];
