@@ -112,7 +112,9 @@ impl Gate {
     #[inline(always)]
     pub(super) fn motion<T: Real>(&self, attractor: Attractor, state: State<T>, w: CubicSample<T>) -> [T; 2] {
         let ([rate, rate_change], flow) = (self.rate, state.z + w.value);
-        [flow * rate, (attractor.z_slope(state) + w.slope) * (rate * rate) + flow * rate_change]
+        let bend = (attractor.z_slope(state) + w.slope) * (rate * rate);
+        // The rate of most ticks is constant.
+        [flow * rate, if rate_change == 0.0 { bend } else { bend + flow * rate_change }]
     }
 }
 
