@@ -134,22 +134,35 @@ impl Transport {
         }
     }
 
-    /// Returns the lags ℓ at clocks `u`, each of which has not passed its cell or has passed on from it to another, which the
-    /// cell then is.
+    /// Returns the lags ℓ at clocks `u` with their derivatives, each of which has not passed its cell or has passed on from it to
+    /// another, which the cell then is.
     #[inline(always)]
     #[allow(clippy::needless_range_loop)] // See `Kernel`.
-    pub(crate) fn lags_from<const N: usize>(&self, cells: &mut [u16; N], u: &[f64; N]) -> [TransportSample; N] {
-        let mut lags = [TransportSample::default(); N];
+    pub(crate) fn lags_from<const N: usize>(&self, cells: &mut [u16; N], u: &[f64; N]) -> [[f64; N]; 3] {
+        let (mut lags, common) = ([[0.0; N]; 3], cells[0]);
+        let [from, to] = [0, 1].map(|k| self.width * f64::from(common + k));
+        let mut is_common = true;
+        for i in 0..N {
+            is_common &= (cells[i] == common) & (u[i] < to);
+        }
+        if let Some(cubic) = self.cubics.get(usize::from(common)).filter(|_| is_common) {
+            for i in 0..N {
+                let TransportSample { value, slope, bend } = sample(cubic, u[i] - from);
+                (lags[0][i], lags[1][i], lags[2][i]) = (value, slope, bend);
+            }
+            return lags;
+        }
         for i in 0..N {
             let at = usize::from(cells[i]);
             let Some(cubic) = self.cubics.get(at) else { continue };
-            if u[i] < self.width * (at + 1) as f64 {
-                lags[i] = sample(cubic, u[i] - self.width * at as f64);
+            let TransportSample { value, slope, bend } = if u[i] < self.width * (at + 1) as f64 {
+                sample(cubic, u[i] - self.width * at as f64)
             } else {
                 let segment = self.segment_at(u[i]);
                 cells[i] = self.cell(&segment) as u16;
-                lags[i] = segment.lag(u[i]);
-            }
+                segment.lag(u[i])
+            };
+            (lags[0][i], lags[1][i], lags[2][i]) = (value, slope, bend);
         }
         lags
     }

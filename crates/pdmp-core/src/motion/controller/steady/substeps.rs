@@ -5,7 +5,6 @@ use super::SteadyMovements;
 use super::tick::Steps;
 use crate::dynamics::canonical::{Canonical, amplitude};
 use crate::dynamics::forcing_table::TableIndex;
-use crate::dynamics::transport::TransportSample;
 
 /// Number of movements in a block: their cubics (0.8 kB each at D = 7 and J = 3) fit into the first-level cache.
 pub(super) const BLOCK: usize = 16;
@@ -145,26 +144,27 @@ impl Steps<'_, '_> {
         ) else {
             return;
         };
-        let samples = primitive.transport.lags_from(cells, &u);
+        let [values, slopes, bends] = primitive.transport.lags_from(cells, &u);
         for i in 0..N {
             to.place[at + i] = first + i;
             to.propagator[at + i] = propagators[i];
             to.rate[at + i] = rates[i];
-            let TransportSample { value, slope, bend } = samples[i];
             to.lags[0][at + i] = lags[i];
-            to.lags[1][at + i] = value;
-            lags[i] = value;
-            to.frame_slopes[0][at + i] = slope;
-            to.frame_slopes[1][at + i] = bend;
+            to.lags[1][at + i] = values[i];
+            lags[i] = values[i];
+            to.frame_slopes[0][at + i] = slopes[i];
+            to.frame_slopes[1][at + i] = bends[i];
         }
         let table = primitive.forcing_table();
         for i in 0..N {
-            let index = table.demonstrated_index(u[i]);
+            to.index[at + i] = table.demonstrated_index(u[i]);
+        }
+        for i in 0..N {
+            let index = to.index[at + i];
             if !index.is_in_cell_of(*last) {
                 table.prefetch_at(index);
             }
             *last = index;
-            to.index[at + i] = index;
         }
     }
 }
