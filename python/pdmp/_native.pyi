@@ -268,7 +268,7 @@ def fit(
     smoothing : "auto", float or None
         Smoothing of the positions: by generalised cross-validation over all demonstrations for each degree of freedom,
         which leaves clean ones unchanged; by a cut-off frequency in Hz; or none, so that every sample is interpolated.
-        Recordings that start or end at rest, by the same score, are smoothed with zero velocity there.
+        Recordings that do not contradict zero velocity at their start or end are smoothed with it there.
         `model.noise` and `model.cut_offs` hold the result.
     nominal : int, optional
         Index of the nominal demonstration; by default the one of median duration.

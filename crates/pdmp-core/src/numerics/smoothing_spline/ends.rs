@@ -19,12 +19,12 @@ pub(crate) type Rest = [bool; 2];
 /// Ends without a condition.
 pub(crate) const NATURAL: Rest = [false; 2];
 
-/// Largest increase of n·ln of the score of one recording with an end at rest. A velocity of z standard deviations increases it
-/// by about z².
-const MAX_INCREASE: f64 = 20.0;
+/// Largest increase of n·ln of the scores with an end at rest, of all recordings together and of one of them. A velocity of z
+/// standard deviations increases it by about z² − 1.
+const MAX_INCREASES: [f64; 2] = [9.0, 20.0];
 
-/// Finds the ends (D,) at which the recordings are at rest: those where zero velocity lowers the score of all together, and
-/// contradicts none. Columns without cut-off and recordings with a period have none.
+/// Finds the ends (D,) at which the recordings are at rest: those where they contradict zero velocity neither together nor one of
+/// them. Columns without cut-off and recordings with a period have none.
 ///
 /// # Errors
 /// Threads that the system does not provide.
@@ -48,7 +48,7 @@ pub(super) fn at_rest(
     for (column, &d) in columns.iter().enumerate() {
         ends[d] = [0, 1].map(|end| {
             let of_each = increases.iter().map(|of_recording| of_recording[column][end]);
-            of_each.clone().sum::<f64>() < 0.0 && of_each.fold(0.0, f64::max) < MAX_INCREASE
+            of_each.clone().sum::<f64>() < MAX_INCREASES[0] && of_each.fold(0.0, f64::max) < MAX_INCREASES[1]
         });
     }
     Ok(ends)

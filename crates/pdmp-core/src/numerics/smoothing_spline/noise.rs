@@ -79,9 +79,9 @@ impl Noise {
 
     /// Returns the ends (D,), first and last, at which recordings are smoothed with zero velocity.
     ///
-    /// These are the ends of discrete movements at which zero velocity predicts the samples better than none given, by
-    /// generalised cross-validation over all recordings. Elsewhere the spline has no curvature at its ends, by which movements
-    /// that start from rest would have a start velocity.
+    /// These are the ends of discrete movements at which the samples do not contradict zero velocity, by the scores of generalised
+    /// cross-validation. Elsewhere the spline has no curvature at its ends, by which movements that start from rest would have a
+    /// start velocity.
     pub fn ends(&self) -> &[[bool; 2]] {
         &self.ends
     }
