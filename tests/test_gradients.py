@@ -20,16 +20,19 @@ def centre_of(model: pdmp.Model) -> str:
 
 
 def cost(movements: tuple[Any, ...]) -> Any:
-    """Returns a loss that is not linear in positions, velocities and accelerations."""
-    positions, velocities, accelerations = movements
-    slopes = 0.1 * (velocities**2).sum() + 1e-3 * (accelerations**2).sum()
-    return (positions**2 * (1 + positions)).sum() + slopes
+    """Returns a loss that is not linear in positions and their derivatives."""
+    positions, *slopes = movements
+    squares = (
+        weight * (array**2).sum() for weight, array in zip((0.1, 1e-3), slopes, strict=False)
+    )
+    return (positions**2 * (1 + positions)).sum() + sum(squares)
 
 
 def cotangents(movements: tuple[Any, ...]) -> tuple[Any, ...]:
     """Returns the derivatives of `cost`."""
-    positions, velocities, accelerations = movements
-    return 2 * positions + 3 * positions**2, 0.2 * velocities, 2e-3 * accelerations
+    positions, *slopes = movements
+    by_slopes = (2 * weight * array for weight, array in zip((0.1, 1e-3), slopes, strict=False))
+    return 2 * positions + 3 * positions**2, *by_slopes
 
 
 def pose(phase: Any, turn: Any, lean: float) -> Any:
@@ -85,7 +88,9 @@ def difference(model: pdmp.Model, given: dict[str, Any], name: str, options: Any
         step = np.zeros(value.shape)
         step[index] = 1e-5
         ahead, behind = (
-            cost(model.rollouts(**{**given, name: value + sign * step}, derivatives=2, **options))
+            cost(
+                model.rollouts(**{"derivatives": 2, **given, name: value + sign * step, **options})
+            )
             for sign in (1, -1)
         )
         found[index] = (ahead - behind) / 2e-5
@@ -141,10 +146,10 @@ def test_gradients_of_poses_are_differences_of_costs(poses: pdmp.Model, shares_t
         given["tau"] = 1.3 * poses.tau
     options: dict[str, Any] = {"dt": 0.01, "duration": 1.7}
     wrt: Any = list(given)
-    movements = poses.rollouts(**given, **options)
+    movements = poses.rollouts(**given, derivatives=1, **options)
     found = poses.rollouts_vjp(wrt, cotangents(movements), **given, **options)
     for name, gradient in zip(wrt, found, strict=True):
-        expected = difference(poses, given, name, options)
+        expected = difference(poses, given, name, {"derivatives": 1, **options})
         total = gradient if np.ndim(given[name]) == gradient.ndim else gradient.sum(axis=0)
         assert total.shape == expected.shape
         np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6 * abs(expected).max())

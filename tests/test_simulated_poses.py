@@ -67,9 +67,9 @@ def test_measured_pose_spares_the_grasp(carried: dict[str, box.Record]) -> None:
     assert len(carried["closed"].commanded) > 1.2 * len(carried["open"].commanded)
 
 
-@pytest.mark.parametrize(("task", "largest"), [("openbox", 1e-3), ("sink", 2e-3)])
+@pytest.mark.parametrize(("task", "largest"), [("openbox", 1e-3), ("sink", 2.5e-3)])
 def test_tool_of_a_panda_follows_recorded_poses(task: str, largest: float) -> None:
-    """Tracking errors are below 1 or 2 mm, and 0.1°."""
+    """Tracking errors are below 1 or 2.5 mm, and 0.1°: the recorded path of `sink` has jumps."""
     demos = panda.tasks().get(task)
     if demos is None:
         pytest.skip("the recordings are not below PDMP_DATA")

@@ -49,7 +49,8 @@ impl Roughness {
     pub(super) fn extend<T: Copy>(&self, y: &mut Vec<T>) {
         let (first, last) = (y[0], y[y.len() - 1]);
         if self.rest[0] {
-            y.insert(0, first);
+            y.push(first);
+            y.rotate_right(1);
         }
         if self.rest[1] {
             y.push(last);
