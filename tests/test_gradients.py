@@ -270,35 +270,26 @@ def test_jax_differentiates_through_movements(model: pdmp.Model) -> None:
         np.testing.assert_array_equal(mapped, model.rollouts(style=STYLES, **options)[0])
 
 
-def test_jax_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
-    """`jax.test_util.check_grads` accepts gradients of movements that differ in tau."""
+def assert_jax_accepts_gradients(model: pdmp.Model, given: dict[str, Any], **options: Any) -> None:
+    """Compares compiled gradients with differences by `jax.test_util.check_grads`."""
     jax = pytest.importorskip("jax")
     check_grads = pytest.importorskip("jax.test_util").check_grads
     with jax.enable_x64(True):
-        given = {n: jax.numpy.asarray(v, dtype=float) for n, v in timed_for(model).items()}
-        move = pdmp.autodiff.jax_rollouts(model, derivatives=2, dt=0.05, duration=1.3)
+        arrays = {n: jax.numpy.asarray(v, dtype=float) for n, v in given.items()}
+        move = jax.jit(pdmp.autodiff.jax_rollouts(model, **options))
         check_grads(
-            lambda given: jax.jit(move)(**given),
-            (given,),
-            1,
-            ["rev"],
-            eps=1e-6,
-            atol=1e-6,
-            rtol=1e-5,
+            lambda given: move(**given), (arrays,), 1, ["rev"], eps=1e-6, atol=1e-6, rtol=1e-5
         )
+
+
+def test_jax_checks_gradients_of_different_tau(model: pdmp.Model) -> None:
+    """`jax.test_util.check_grads` accepts gradients of movements that differ in tau."""
+    assert_jax_accepts_gradients(model, timed_for(model), derivatives=2, dt=0.05, duration=1.3)
 
 
 def test_jax_checks_gradients_of_poses(poses: pdmp.Model) -> None:
     """`jax.test_util.check_grads` accepts gradients of rotations and angular velocities."""
-    jax = pytest.importorskip("jax")
-    check_grads = pytest.importorskip("jax.test_util").check_grads
-    with jax.enable_x64(True):
-        given = {n: jax.numpy.asarray(v, dtype=float) for n, v in posed_for(poses).items()}
-        move = pdmp.autodiff.jax_rollouts(poses, derivatives=1, dt=0.41, duration=1.7)
-        move = jax.jit(move)
-        check_grads(
-            lambda given: move(**given), (given,), 1, ["rev"], eps=1e-6, atol=1e-6, rtol=1e-5
-        )
+    assert_jax_accepts_gradients(poses, posed_for(poses), derivatives=1, dt=0.41, duration=1.7)
 
 
 def test_jax_keeps_single_precision(reach: pdmp.Model) -> None:
