@@ -9,7 +9,7 @@ use crate::dynamics::transport::Transport;
 use crate::error::{Error, Result};
 use crate::learning::assembly::Foundation;
 use crate::learning::constants::Constants;
-use crate::learning::factorization::{Factors, orthonormal_styles};
+use crate::learning::factorization::{Factors, Truncation, orthonormal_styles};
 use crate::learning::fit::{Contexts, learn_map};
 use crate::learning::movement_metric::{phase_curves, residual_variance};
 use crate::learning::noise_findings;
@@ -54,7 +54,7 @@ impl PartialFit {
         if n_demos == 0 {
             return Err(Error::NoDemonstrations);
         }
-        if !self.triangle.has_finite_elements() {
+        if !self.factor.has_finite_elements() {
             return Err(Error::Fit("the targets overflow: give the demonstrations in a larger unit".into()));
         }
         let nominal = options.alignment().nominal_of(&self.summaries.durations)?;
@@ -73,7 +73,10 @@ impl PartialFit {
             }
             _ => Transport::immediate(),
         };
-        let rows = self.triangle.matrix();
+        // Styles beyond the rank of the targets are of rows of zeros.
+        let min_rows =
+            if let NStyles::Truncated(Truncation::Rank(n)) = options.n_styles { n.clamp(1, n_demos) } else { 1 };
+        let rows = self.factor.matrix(min_rows);
         let targets = self.compressed_targets(&rows, &transport, &dof_scale);
         let contexts = self.summaries.tabulated();
         let mut factorising = |share| progress(Stage::Factorise, share);
@@ -152,9 +155,9 @@ impl PartialFit {
         Ok(factorised)
     }
 
-    /// Returns a matrix A (N, C·D) with AᵀA = FᵀF for the targets F (M, C·D) about the moving frame, scaled.
+    /// Returns a matrix A (K, C·D) with AᵀA = FᵀF for the targets F (M, C·D) about the moving frame, scaled.
     ///
-    /// Both are linear in the targets about the goal and the reaches g − y₀, which the triangular factor holds.
+    /// Both are linear in the targets about the goal and the reaches g − y₀, which the factor holds.
     fn compressed_targets(&self, rows: &Array2<f64>, transport: &Transport, dof_scale: &[f64]) -> Array2<f64> {
         let (n_dofs, n_samples) = (self.n_dofs(), self.settings.n_samples);
         let mut targets = rows.slice(s![.., ..n_samples * n_dofs]).to_owned();
@@ -164,14 +167,14 @@ impl PartialFit {
             for (c, mut sample) in row.exact_chunks_mut(n_dofs).into_iter().enumerate() {
                 for (d, f) in sample.iter_mut().enumerate() {
                     let lag = lag.as_ref().map_or(0.0, |lag| lag[c]);
-                    *f = (*f - reach[d] * lag) * (self.settings.size / dof_scale[d]);
+                    *f = (*f - reach[d] * lag) * (self.settings.sizes[d] / dof_scale[d]);
                 }
             }
         }
         targets
     }
 
-    /// Returns the span of the regressors in the rows of the triangular factor; the first is constant.
+    /// Returns the span of the regressors in the rows of the factor; the first is constant.
     fn compressed_regressors(&self, rows: &Array2<f64>, contexts: &Contexts) -> OrthonormalSpan {
         let squares = squares_are_regressors(&contexts.0, &contexts.1);
         let first = rows.ncols() - self.regressors.len();

@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::block_styles::{BlockStyles, StyleProjection};
 use super::partial_fit::{PartialFit, Regressor};
+use super::row_factor::{RowFactor, Span};
 use super::settings::Settings;
 use super::summaries::{Summaries, Values};
-use super::triangle::Triangle;
 use crate::dynamics::transport::Transport;
 use crate::error::Result;
 use crate::learning::options::FitOptions;
@@ -22,7 +22,7 @@ use crate::model::responses::Curves;
 use crate::numerics::threads::Threads;
 
 /// Version of the format.
-const SCHEMA: u32 = 2;
+const SCHEMA: u32 = 3;
 /// Metadata key of the constants.
 const KEY: &str = "pdmp-partial";
 
@@ -129,6 +129,8 @@ struct Constants {
     regressors: Vec<Regressor>,
     /// Labels of each context value; empty for a number.
     labels: Vec<Vec<String>>,
+    /// Largest norm of a row of the targets, if they lie in a span.
+    largest: Option<f64>,
 }
 
 /// Type of an object in its file.
@@ -185,14 +187,17 @@ impl PartialFit {
             Values::Numbers(numbers) => numbers.clone(),
             Values::Labels(_, indices) => indices.iter().map(|index| *index as f64).collect(),
         };
+        let (span, triangle) = self.factor.parts();
         let constants = Constants {
             settings: self.settings.clone(),
             regressors: self.regressors.clone(),
             labels: summaries.contexts.iter().map(labels).collect(),
+            largest: span.map(|span| span.largest),
         };
         let (profile_samples, profile_dofs, profile_counts) = self.profile.numbers();
         let arrays = vec![
-            list("triangle", self.triangle.elements()),
+            list("span", span.map_or_else(Vec::new, |span| span.vectors.clone())),
+            list("triangle", triangle),
             flat("profile.samples", &profile_samples),
             flat("profile.dofs", &profile_dofs),
             list("profile.counts", profile_counts.to_vec()),
@@ -215,14 +220,18 @@ impl PartialFit {
     /// Bytes that are damaged, not a partial fit, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let (constants, crc32, mut reader) = Reader::open::<Constants>(PARTIAL, bytes)?;
-        let Constants { settings, regressors, labels } = constants;
+        let Constants { settings, regressors, labels, largest } = constants;
         settings.check().map_err(unreadable)?;
         let mut partial = Self::with(settings, Threads::available())?;
         let (n_dofs, n_contexts) = (partial.n_dofs(), partial.settings.contexts.len());
         ensure(labels.len() == n_contexts && regressors.starts_with(&partial.regressors), "its contexts do not agree")?;
-        let n = partial.triangle.n_columns() + regressors.len() - partial.regressors.len();
+        let n = partial.factor.n_columns() + regressors.len() - partial.regressors.len();
         let [n_demos] = reader.shape("durations")?;
-        partial.triangle = Triangle::from_elements(n, &reader.array("triangle", &[n * (n + 1) / 2])?);
+        let [n_vectors] = reader.shape("span")?.map(|length: usize| length / n);
+        let vectors = reader.array("span", &[n_vectors * n])?;
+        let span = largest.map(|largest| Span { vectors, largest });
+        let rank = if span.is_some() { n_vectors } else { n };
+        partial.factor = RowFactor::from_parts(n, span, &reader.array("triangle", &[rank * (rank + 1) / 2])?);
         let n_profile = partial.profile.n_samples();
         let samples = reader.matrix("profile.samples", (n_profile, 2 * n_dofs + 1))?;
         let (dofs, counts) = (reader.matrix("profile.dofs", (3, n_dofs))?, reader.array("profile.counts", &[2])?);

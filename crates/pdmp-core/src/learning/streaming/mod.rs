@@ -17,6 +17,7 @@ mod factorised_fit;
 mod file;
 mod fit_blocks;
 mod partial_fit;
+mod row_factor;
 mod settings;
 mod summaries;
 mod triangle;

@@ -1,10 +1,10 @@
 //! Partial fit: all that a fit needs of the demonstrations so far.
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1, Axis};
 
+use super::row_factor::RowFactor;
 use super::settings::{ContextScale, Settings};
 use super::summaries::{Summaries, Values};
-use super::triangle::Triangle;
 use crate::demonstration::Demonstration;
 use crate::error::{Error, Result};
 use crate::kind::Kind;
@@ -57,7 +57,7 @@ pub struct PartialFit {
     pub(super) summaries: Summaries,
     /// Columns of the factor after the targets and reaches.
     pub(super) regressors: Vec<Regressor>,
-    pub(super) triangle: Triangle,
+    pub(super) factor: RowFactor,
     /// Sums for the transport profile of discrete movements.
     pub(super) profile: ProfileSums,
     /// Largest ranges (D,).
@@ -108,7 +108,7 @@ impl PartialFit {
         zeros("triangular factor of the targets", (n, 2 * n)).map(drop)?;
         Ok(Self {
             summaries: Summaries::none(n_dofs, &settings.contexts),
-            triangle: Triangle::zero(n),
+            factor: RowFactor::zero(n),
             profile: ProfileSums::zero(n_profile, n_dofs),
             ranges: vec![0.0; n_dofs],
             accelerations: vec![0.0; n_dofs],
@@ -177,12 +177,13 @@ impl PartialFit {
             own.iter_mut().zip(others).for_each(|(own, other)| *own = own.max(other));
         }
         self.add_labels();
-        let size = self.settings.size;
-        let mut reaches = &targets.goals - &targets.starts;
-        reaches.mapv_inplace(|x| x / size);
-        targets.forcing.mapv_inplace(|x| x / size);
+        let sizes = ArrayView1::from(&self.settings.sizes);
+        let reaches = (&targets.goals - &targets.starts) / &sizes;
+        for mut samples in targets.forcing.axis_chunks_iter_mut(Axis(1), self.n_dofs()) {
+            samples /= &sizes;
+        }
         let columns = self.regressors(first);
-        self.triangle.update(&[targets.forcing.view(), reaches.view(), columns.view()], threads)
+        self.factor.update(&[targets.forcing.view(), reaches.view(), columns.view()], threads)
     }
 
     /// Adds the demonstrations of another partial fit after those of this one.
@@ -202,20 +203,11 @@ impl PartialFit {
         }
         self.keep(other.findings.iter().map(|finding| finding.clone().shifted(first)));
         self.add_labels();
-        if self.regressors == other.regressors {
-            return self.triangle.merge(&other.triangle, self.threads);
-        }
-        // Labels in another order: the other factor with its columns rearranged is a matrix of the same products.
-        let rows = other.triangle.matrix();
-        let n = self.triangle.n_columns() - self.regressors.len();
-        let mut rearranged = Array2::zeros((rows.nrows(), self.triangle.n_columns()));
-        rearranged.slice_mut(ndarray::s![.., ..n]).assign(&rows.slice(ndarray::s![.., ..n]));
-        for (k, regressor) in other.regressors.iter().enumerate() {
-            if let Some(own) = self.regressors.iter().position(|own| own == regressor) {
-                rearranged.column_mut(n + own).assign(&rows.column(n + k));
-            }
-        }
-        self.triangle.update(&[rearranged.view()], self.threads)
+        // Labels may appear in another order.
+        let n = other.factor.n_columns() - other.regressors.len();
+        let place = |regressor| self.regressors.iter().position(|own| own == regressor);
+        let others = other.regressors.iter().filter_map(place).map(|place| n + place);
+        self.factor.merge(&other.factor, &(0..n).chain(others).collect::<Vec<_>>(), self.threads)
     }
 
     /// Adds columns for labels that are new.
@@ -230,8 +222,8 @@ impl PartialFit {
             }
         }
         let n = self.settings.n_samples * self.n_dofs() + self.n_dofs() + self.regressors.len();
-        if n > self.triangle.n_columns() {
-            self.triangle.extend(n);
+        if n > self.factor.n_columns() {
+            self.factor.extend(n);
         }
     }
 

@@ -42,8 +42,9 @@ pub(super) struct Settings {
     pub(super) units: Vec<String>,
     /// Unit of each DoF (D,) in which arc lengths are measured, of the size of the movement.
     pub(super) unit: Vec<f64>,
-    /// Power of two by which targets are divided, so that their squares neither overflow nor underflow.
-    pub(super) size: f64,
+    /// Powers of two (D,) near multiples of the unit, by which targets are divided so that their squares neither overflow nor
+    /// underflow.
+    pub(super) sizes: Vec<f64>,
     /// Types of the context values (Q,); empty without contexts.
     pub(super) contexts: Vec<ContextScale>,
     /// Samples of a demonstration (9, D), from which the whole turns of others are counted; empty without angles.
@@ -92,7 +93,7 @@ impl Settings {
             ends: aligned.noise.ends().to_vec(),
             n_samples: aligned.n_samples,
             unit: vec![1.0; names.len()],
-            size: 1.0,
+            sizes: vec![1.0; names.len()],
             contexts: scales.collect(),
             names,
             units,
@@ -100,9 +101,12 @@ impl Settings {
         };
         let (attractor, canonical) = (settings.attractor(), settings.canonical);
         let targets = Targets::of(&aligned, attractor, canonical, options.threads, &mut |_| Ok(()))?;
-        let (ranges, largest) = (targets.ranges(), targets.forcing.iter().fold(0.0f64, |most, f| most.max(f.abs())));
+        let ranges = targets.ranges();
         settings.unit = settings.unit_of(&options.dof_scale.of(&ranges, &settings.units), &ranges);
-        settings.size = power_of_two(largest);
+        let units: Vec<f64> = settings.unit.iter().map(|unit| power_of_two(*unit)).collect();
+        let scaled = targets.forcing.iter().zip(units.iter().cycle()).map(|(f, unit)| f.abs() / unit);
+        let largest = power_of_two(scaled.fold(0.0, f64::max));
+        settings.sizes = units.iter().map(|unit| unit * largest).collect();
         Ok(settings)
     }
 
@@ -118,10 +122,17 @@ impl Settings {
     /// The name of a setting out of range.
     pub(super) fn check(&self) -> std::result::Result<(), &'static str> {
         let n_dofs = self.n_dofs();
-        let lengths = [self.units.len(), self.levels.len(), self.cut_offs.len(), self.ends.len(), self.unit.len()];
+        let lengths = [
+            self.units.len(),
+            self.levels.len(),
+            self.cut_offs.len(),
+            self.ends.len(),
+            self.unit.len(),
+            self.sizes.len(),
+        ];
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let numbers =
-            || self.cut_offs.iter().flatten().chain(&self.unit).chain([&self.alpha_z, &self.beta_z, &self.size]);
+            || self.cut_offs.iter().flatten().chain(&self.unit).chain(&self.sizes).chain([&self.alpha_z, &self.beta_z]);
         let scales = self.contexts.iter().all(|scale| match scale {
             ContextScale::Number { offset, scale } => offset.is_finite() && positive(*scale),
             ContextScale::Label => true,

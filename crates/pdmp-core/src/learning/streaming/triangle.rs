@@ -115,7 +115,7 @@ impl Triangle {
     }
 
     /// Reflects [R; B] to the triangle of both, for B (m, N) whose first columns are zero.
-    fn reflect(&mut self, mut block: MatMut<f64>, zeros: usize, threads: Threads) -> Result<()> {
+    pub(super) fn reflect(&mut self, mut block: MatMut<f64>, zeros: usize, threads: Threads) -> Result<()> {
         let n = self.n_columns();
         let first = zeros / PANEL * PANEL;
         for start in (first..n).step_by(PANEL) {
@@ -139,7 +139,7 @@ impl Triangle {
 }
 
 /// Splits a matrix into parts of [`CHUNK`] columns.
-fn chunks(matrix: MatMut<f64>) -> Vec<MatMut<f64>> {
+pub(super) fn chunks(matrix: MatMut<f64>) -> Vec<MatMut<f64>> {
     let (mut parts, mut rest) = (Vec::new(), matrix);
     while rest.ncols() > CHUNK {
         let (part, others) = rest.split_at_col_mut(CHUNK);
@@ -216,7 +216,7 @@ fn reflect_columns(vectors: MatRef<f64>, coupling: MatRef<f64>, mut top: MatMut<
     matmul(below, Accum::Add, vectors, &shares, -1.0, Par::Seq);
 }
 
-fn dot(x: faer::ColRef<f64>, y: faer::ColRef<f64>) -> f64 {
+pub(super) fn dot(x: faer::ColRef<f64>, y: faer::ColRef<f64>) -> f64 {
     // Four sums, for vector registers.
     let mut sums = [0.0; 4];
     match (x.try_as_col_major(), y.try_as_col_major()) {
