@@ -3,10 +3,11 @@
 ``make bench-streaming`` runs this for `SIZES`, and draws docs/streaming.png; arguments are other
 numbers of demonstrations. Each fit runs in a process of its own, whose largest memory beside a
 block is reported. Times are those of the processor, summed over threads, without the generation of
-the blocks in every pass. The other libraries compute five factors of the positions of the same
-blocks, without alignment, targets or a model.
+the blocks in every pass; BLAS has one thread, since its idle ones would count. The other libraries
+compute five factors of the positions of the same blocks, without alignment, targets or a model.
 """
 
+import os
 import resource
 import subprocess
 import sys
@@ -21,10 +22,12 @@ from pdmp.plot.canvas import MARKERS, PALETTE, label_axes, new_figure
 
 SIZES = [1000, 3162, 10_000, 31_623, 100_000]  # M
 MAX_OTHERS = 100_000  # M of the other libraries
+NOISE = 1e-3  # standard deviation of that of noisy recordings
 BLOCK = 2000  # demonstrations
 N_SAMPLES, N_DOFS, N_FACTORS = 200, 7, 5
 NAMES = {
     "pdmp": "pdmp, the whole fit",
+    "noisy": "pdmp, recordings with noise",
     "dask": "dask, svd_compressed",
     "sklearn": "scikit-learn, IncrementalPCA",
 }
@@ -32,10 +35,10 @@ STAGES = ("first pass", "factors", "styles", "finish")
 
 
 class Library:
-    """Generator of reaches with twelve factors of variation, start and goal."""
+    """Generator of reaches with twelve factors of variation, start and goal, and noise."""
 
-    def __init__(self, n_demos: int) -> None:
-        self.n_demos = n_demos
+    def __init__(self, n_demos: int, noise: float = 0.0) -> None:
+        self.n_demos, self.noise = n_demos, noise
         self.seconds: list[float] = []  # of the processor, by block
         s = np.linspace(0, 1, N_SAMPLES)[:, None]
         rise = s**3 * (10 - 15 * s + 6 * s**2)
@@ -58,8 +61,11 @@ class Library:
         """Returns block k as an array (B, T, D)."""
         start = thread_time()
         size = min(BLOCK, self.n_demos - k * BLOCK)
-        weights = np.random.default_rng(k).normal(size=(size, len(self.curves)))
+        rng = np.random.default_rng(k)
+        weights = rng.normal(size=(size, len(self.curves)))
         positions = (weights @ self.curves).reshape(size, N_SAMPLES, N_DOFS)
+        if self.noise:
+            positions += rng.normal(0, self.noise, positions.shape)
         self.seconds.append(thread_time() - start)
         return positions
 
@@ -147,12 +153,12 @@ def incremental_components(library: Library, watch: Stopwatch) -> None:
     watch.stop("styles")
 
 
-METHODS = {"pdmp": fit, "dask": dask_factors, "sklearn": incremental_components}
+METHODS = {"pdmp": fit, "noisy": fit, "dask": dask_factors, "sklearn": incremental_components}
 
 
 def report(method: str, n_demos: int) -> None:
     """Prints the times and the memory of a method, as numbers."""
-    library = Library(n_demos)
+    library = Library(n_demos, NOISE if method == "noisy" else 0.0)
     watch = Stopwatch(library)
     before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, perf_counter()
     METHODS[method](library, watch)
@@ -164,8 +170,9 @@ def report(method: str, n_demos: int) -> None:
 def measure(method: str, n_demos: int) -> list[float]:
     """Returns time on the clock [s], memory [MB] and seconds by stage, of a process of its own."""
     command = [sys.executable, __file__, method, str(n_demos)]
-    printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    return [float(number) for number in printed.split()[2:]]
+    settings = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    run = subprocess.run(command, check=True, capture_output=True, text=True, env=settings)
+    return [float(number) for number in run.stdout.split()[2:]]
 
 
 def draw(results: dict[tuple[str, int], list[float]]) -> None:
@@ -191,7 +198,7 @@ def main(sizes: list[int]) -> None:
     results = {}
     for size in sizes:
         for method, name in NAMES.items():
-            if method != "pdmp" and size > MAX_OTHERS:
+            if method in ("dask", "sklearn") and size > MAX_OTHERS:
                 continue
             results[method, size] = [wall, memory, *stages] = measure(method, size)
             total = sum(stages)

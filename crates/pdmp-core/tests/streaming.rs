@@ -164,6 +164,31 @@ fn blocks_give_the_model_of_all_demonstrations() {
     assert_eq!(model.map().unwrap().columns(), whole.map().unwrap().columns());
 }
 
+/// Styles beyond the dimensions in which the demonstrations vary are zero in all of them.
+#[test]
+fn styles_may_exceed_the_dimensions_of_the_demonstrations() {
+    let demos = |scales: &[f64]| -> Vec<Demonstration> {
+        let s = Array2::from_shape_fn((101, 2), |(k, d)| (k as f64 / 100.0).powi(2 + d as i32));
+        let demo = |scale: &f64| Demonstration::new(&s * *scale, Sampling::Uniform { dt: 0.01 }).unwrap();
+        scales.iter().map(demo).collect()
+    };
+    let options = FitOptions::discrete().n_styles(Truncation::Rank(4));
+    for scales in [[1.0, 2.0, 3.0, 1.5, 2.5], [1.0; 5]] {
+        let demos = demos(&scales);
+        let (model, whole) = (streamed(&demos, 2, &options).0, fit(&demos, &options).unwrap());
+        assert_eq!(model.n_styles(), 4);
+        let values = &model.learnt().singular_values;
+        assert!(difference(&ndarray::arr1(&values[..1]), &ndarray::arr1(&whole.learnt().singular_values[..1])) < 1e-10);
+        assert!(values[1..].iter().all(|value| *value <= 1e-12 * values[0]));
+        let grid = TimeGrid { dt: 0.01, duration: None };
+        for m in 0..5 {
+            let [own, other] = [&model, &whole]
+                .map(|model| rollout(model.primitive(), &model.conditions(&[m]).unwrap(), grid).unwrap().position);
+            assert!(difference(&own, &other) < 1e-9);
+        }
+    }
+}
+
 /// The order in which partial fits are merged does not matter, but for rounding; labels may appear in any order.
 #[test]
 fn merging_is_associative() {

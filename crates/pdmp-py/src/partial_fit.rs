@@ -19,8 +19,8 @@ use crate::scalar::{Scalar, optional_count, optional_number};
 
 /// Partial fit of a growing collection of demonstrations, which blocks and other partial fits are added to.
 ///
-/// Its size is that of a triangular factor R with RᵀR = FᵀF for the targets F (M, C·D) of the demonstrations, and of a few
-/// numbers for each of them. The order in which parts are merged matters to rounding only. `finish` reads the blocks
+/// Its size is that of a factor R with RᵀR = FᵀF for the targets F (M, C·D) of the demonstrations, with a row for each of the
+/// dimensions in which they vary, and of a few numbers for each demonstration. The order in which parts are merged matters to rounding only. `finish` reads the blocks
 /// once more, for their styles.
 ///
 /// Parameters

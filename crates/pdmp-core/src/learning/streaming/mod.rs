@@ -1,7 +1,7 @@
 //! Fit of demonstrations that arrive in blocks, in bounded memory.
 //!
 //! The targets F (M, C·D) of M demonstrations are needed for their singular value decomposition alone, and all but the styles
-//! follows from a triangular factor R of F:
+//! follows from a factor R of F, RᵀR = FᵀF, with no more rows than F has dimensions:
 //!
 //! ```text
 //! blocks ─ alignment, targets ─► R, sums and numbers of each demonstration ─ factorise ─► V·Σ⁻¹, F_basis

@@ -19,8 +19,9 @@ use crate::validate::zeros;
 /// Largest number of findings that are kept.
 const MAX_FINDINGS: usize = 100;
 
-/// Summary of the demonstrations so far from which a fit follows, in bounded memory: a triangular factor R (N, N) of their
-/// targets F (M, C·D), N = C·D + D + 1 and a few numbers for each context value, and O(D) numbers of each demonstration.
+/// Summary of the demonstrations so far from which a fit follows, in bounded memory: a factor R (K, N) of their targets
+/// F (M, C·D), N = C·D + D + 1 and a few numbers for each context value, and O(D) numbers of each demonstration. K is the
+/// number of dimensions in which the demonstrations vary, to 1e-12, if it is at most N/4; otherwise K = N.
 ///
 /// RᵀR = FᵀF, so that R has the singular values and F_basis of F. Partial fits of parts are merged in any tree; the result
 /// does not depend on it, but for rounding. Number of samples C, cut-offs of smoothing and the clock at the end of the

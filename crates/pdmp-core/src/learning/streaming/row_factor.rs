@@ -106,12 +106,27 @@ impl RowFactor {
     /// # Errors
     /// The first error of a thread.
     pub(super) fn update(&mut self, rows: &[ArrayView2<f64>], threads: Threads) -> Result<()> {
-        let largest = largest_norm(rows);
-        if let Some(span) = &mut self.span {
-            span.largest = span.largest.max(largest);
+        let n_rows = rows.first().map_or(0, |columns| columns.nrows());
+        let (mut start, mut size) = (0, FEW_ROWS);
+        while start < n_rows {
+            let rank = self.triangle.n_columns();
+            let Some(span) = &mut self.span else {
+                let rest: Vec<_> = rows.iter().map(|columns| columns.slice(s![start.., ..])).collect();
+                return self.triangle.update(&rest, threads);
+            };
+            let end = n_rows.min(start + size);
+            let Some(coordinates) = span.coordinates(block(rows, start..end), self.n_columns, threads)? else {
+                self.leave_span(threads)?;
+                continue;
+            };
+            let grows = coordinates.nrows() > rank;
+            if grows {
+                self.triangle.extend(coordinates.nrows());
+            }
+            self.triangle.reflect(coordinates.transpose().to_owned().as_mut(), 0, threads)?;
+            (start, size) = (end, if grows { FEW_ROWS } else { ROWS });
         }
-        let largest = self.span.as_ref().map_or(largest, |span| span.largest);
-        self.add(rows, largest, threads)
+        Ok(())
     }
 
     /// Adds the rows of another factor, whose column k is the column `places[k]` of this one.
@@ -129,35 +144,12 @@ impl RowFactor {
         for (column, place) in rows.columns().into_iter().zip(places) {
             placed.column_mut(*place).assign(&column);
         }
-        let rows = [placed.view()];
-        self.add(&rows, largest_norm(&rows), threads)?;
-        if let (Some(span), Some(others)) = (&mut self.span, &other.span) {
-            span.largest = span.largest.max(others.largest);
-        }
-        Ok(())
-    }
-
-    /// Adds rows, the largest of which has a norm of `largest`.
-    fn add(&mut self, rows: &[ArrayView2<f64>], largest: f64, threads: Threads) -> Result<()> {
-        let n_rows = rows.first().map_or(0, |columns| columns.nrows());
-        let (mut start, mut size) = (0, FEW_ROWS);
-        while start < n_rows {
-            let rank = self.triangle.n_columns();
-            let Some(span) = &mut self.span else {
-                let rest: Vec<_> = rows.iter().map(|columns| columns.slice(s![start.., ..])).collect();
-                return self.triangle.update(&rest, threads);
-            };
-            let end = n_rows.min(start + size);
-            let Some(coordinates) = span.coordinates(block(rows, start..end), self.n_columns, largest, threads)? else {
-                self.leave_span(threads)?;
-                continue;
-            };
-            let grows = coordinates.nrows() > rank;
-            if grows {
-                self.triangle.extend(coordinates.nrows());
-            }
-            self.triangle.reflect(coordinates.transpose().to_owned().as_mut(), 0, threads)?;
-            (start, size) = (end, if grows { FEW_ROWS } else { ROWS });
+        // Rows of the factor stand for many, and are larger than any of them.
+        let largest = |factor: &Self| factor.span.as_ref().map_or(0.0, |span| span.largest);
+        let largest = largest(self).max(largest(other));
+        self.update(&[placed.view()], threads)?;
+        if let Some(span) = &mut self.span {
+            span.largest = largest;
         }
         Ok(())
     }
@@ -183,24 +175,18 @@ fn block(rows: &[ArrayView2<f64>], range: Range<usize>) -> Vec<f64> {
     block
 }
 
-/// Returns the largest norm of a row.
-fn largest_norm(rows: &[ArrayView2<f64>]) -> f64 {
-    let square = |i: usize| rows.iter().map(|columns| columns.row(i).dot(&columns.row(i))).sum::<f64>();
-    (0..rows.first().map_or(0, |columns| columns.nrows())).map(square).fold(0.0, f64::max).sqrt()
+/// Returns the norms of the columns of a matrix.
+fn norms(matrix: MatRef<f64>) -> impl Iterator<Item = f64> {
+    matrix.col_iter().map(|column| dot(column, column).sqrt())
 }
 
 impl Span {
     /// Returns the coordinates (K, m) of the columns of a block (N, m), after directions that it needs have been added to the
     /// span; none if they are too many, or if the block is not finite.
-    fn coordinates(
-        &mut self,
-        mut block: Vec<f64>,
-        n: usize,
-        largest: f64,
-        threads: Threads,
-    ) -> Result<Option<Mat<f64>>> {
+    fn coordinates(&mut self, mut block: Vec<f64>, n: usize, threads: Threads) -> Result<Option<Mat<f64>>> {
         let (rank, m) = (self.vectors.len() / n, block.len() / n);
         let mut rest = MatMut::from_column_major_slice_mut(&mut block, n, m);
+        self.largest = norms(rest.rb()).fold(self.largest, f64::max);
         let mut coordinates = Mat::zeros(rank, m);
         let vectors = MatRef::from_column_major_slice(&self.vectors, n, rank);
         let project = |(mut coordinates, rest): (MatMut<f64>, MatMut<f64>)| {
@@ -211,21 +197,20 @@ impl Span {
         // The chunks do not depend on the number of threads, so that rounding does not either.
         let parts = chunks(coordinates.as_mut()).into_iter().zip(chunks(rest.rb_mut()));
         threads.try_for_each(parts.collect(), project)?;
-        let mut added = Vec::new();
         loop {
-            let norms: Vec<f64> = rest.rb().col_iter().map(|column| dot(column, column).sqrt()).collect();
+            let norms: Vec<f64> = norms(rest.rb()).collect();
             if norms.iter().any(|norm| !norm.is_finite()) {
                 return Ok(None);
             }
             let largest_norm = norms.into_iter().enumerate().max_by(|(_, norm), (_, other)| norm.total_cmp(other));
             let Some((at, norm)) = largest_norm else { break };
-            if norm <= TOLERANCE * largest {
+            if norm <= TOLERANCE * self.largest {
                 break;
             }
-            if (rank + added.len() + 1) * MIN_RATIO > n {
+            if (coordinates.nrows() + 1) * MIN_RATIO > n {
                 return Ok(None);
             }
-            let vectors = MatRef::from_column_major_slice(&self.vectors, n, self.vectors.len() / n);
+            let vectors = MatRef::from_column_major_slice(&self.vectors, n, coordinates.nrows());
             let mut vector = rest.rb().subcols(at, 1) * faer::Scale(1.0 / norm);
             // Projected twice, the direction is orthogonal to the others to rounding.
             vector = &vector - vectors * (vectors.transpose() * &vector);
@@ -233,17 +218,9 @@ impl Span {
             let products = vector.transpose() * rest.rb();
             matmul(rest.rb_mut(), Accum::Add, vector.as_ref(), products.as_ref(), -1.0, Par::Seq);
             self.vectors.extend(vector.col(0).iter());
-            added.push(products);
+            coordinates.resize_with(coordinates.nrows() + 1, m, |_, i| products[(0, i)]);
         }
-        let all =
-            Mat::from_fn(
-                rank + added.len(),
-                m,
-                |k, i| {
-                    if k < rank { coordinates[(k, i)] } else { added[k - rank][(0, i)] }
-                },
-            );
-        Ok(Some(all))
+        Ok(Some(coordinates))
     }
 }
 
