@@ -21,7 +21,7 @@ const MAX_FINDINGS: usize = 100;
 
 /// Summary of the demonstrations so far from which a fit follows, in bounded memory: a factor R (K, N) of their targets
 /// F (M, C·D), N = C·D + D + 1 and a few numbers for each context value, and O(D) numbers of each demonstration. K is the
-/// number of dimensions in which the demonstrations vary, to 1e-12, if it is at most N/4; otherwise K = N.
+/// number of dimensions in which the demonstrations vary, to 1e-12, if it is at most N/8; otherwise K = N.
 ///
 /// RᵀR = FᵀF, so that R has the singular values and F_basis of F. Partial fits of parts are merged in any tree; the result
 /// does not depend on it, but for rounding. Number of samples C, cut-offs of smoothing and the clock at the end of the
@@ -179,10 +179,10 @@ impl PartialFit {
         }
         self.add_labels();
         let sizes = ArrayView1::from(&self.settings.sizes);
-        let reaches = (&targets.goals - &targets.starts) / &sizes;
         for mut samples in targets.forcing.axis_chunks_iter_mut(Axis(1), self.n_dofs()) {
             samples /= &sizes;
         }
+        let reaches = (&targets.goals - &targets.starts) / sizes;
         let columns = self.regressors(first);
         self.factor.update(&[targets.forcing.view(), reaches.view(), columns.view()], threads)
     }

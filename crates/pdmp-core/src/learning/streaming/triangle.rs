@@ -16,7 +16,7 @@
 
 use faer::linalg::matmul::matmul;
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, ColRef, Mat, MatMut, MatRef, Par};
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::Result;
@@ -132,17 +132,17 @@ impl Triangle {
                 reflect_columns(panel, coupling, top, below);
                 Ok(())
             };
-            threads.try_for_each(chunks(tail).into_iter().zip(chunks(rest)).collect(), apply)?;
+            threads.try_for_each(chunks(tail, CHUNK).into_iter().zip(chunks(rest, CHUNK)).collect(), apply)?;
         }
         Ok(())
     }
 }
 
-/// Splits a matrix into parts of [`CHUNK`] columns.
-pub(super) fn chunks(matrix: MatMut<f64>) -> Vec<MatMut<f64>> {
+/// Splits a matrix into parts of `size` columns.
+pub(super) fn chunks(matrix: MatMut<f64>, size: usize) -> Vec<MatMut<f64>> {
     let (mut parts, mut rest) = (Vec::new(), matrix);
-    while rest.ncols() > CHUNK {
-        let (part, others) = rest.split_at_col_mut(CHUNK);
+    while rest.ncols() > size {
+        let (part, others) = rest.split_at_col_mut(size);
         parts.push(part);
         rest = others;
     }
@@ -216,21 +216,18 @@ fn reflect_columns(vectors: MatRef<f64>, coupling: MatRef<f64>, mut top: MatMut<
     matmul(below, Accum::Add, vectors, &shares, -1.0, Par::Seq);
 }
 
-pub(super) fn dot(x: faer::ColRef<f64>, y: faer::ColRef<f64>) -> f64 {
-    // Four sums, for vector registers.
-    let mut sums = [0.0; 4];
-    match (x.try_as_col_major(), y.try_as_col_major()) {
-        (Some(x), Some(y)) => {
-            let (x, y) = (x.as_slice(), y.as_slice());
-            let (fours, rest) = (x.chunks_exact(4).zip(y.chunks_exact(4)), x.len() / 4 * 4);
-            for (x, y) in fours {
-                (0..4).for_each(|lane| sums[lane] += x[lane] * y[lane]);
-            }
-            sums[0] += x[rest..].iter().zip(&y[rest..]).map(|(x, y)| x * y).sum::<f64>();
-        }
-        _ => sums[0] = x.iter().zip(y.iter()).map(|(x, y)| x * y).sum(),
+pub(super) fn dot(x: ColRef<f64>, y: ColRef<f64>) -> f64 {
+    let (Some(x), Some(y)) = (x.try_as_col_major(), y.try_as_col_major()) else {
+        return x.iter().zip(y.iter()).map(|(x, y)| x * y).sum();
+    };
+    let (x, y) = (x.as_slice(), y.as_slice());
+    // Several sums, for vector registers.
+    let mut sums = [0.0; 16];
+    for (x, y) in x.chunks_exact(16).zip(y.chunks_exact(16)) {
+        (0..16).for_each(|lane| sums[lane] += x[lane] * y[lane]);
     }
-    sums.iter().sum()
+    let rest = x.len() / 16 * 16;
+    sums.iter().sum::<f64>() + x[rest..].iter().zip(&y[rest..]).map(|(x, y)| x * y).sum::<f64>()
 }
 
 #[cfg(test)]
