@@ -196,7 +196,7 @@ impl Span {
         MatRef::from_column_major_slice(&self.vectors, n, self.vectors.len() / n)
     }
 
-    /// Returns the coordinates (K, m) of the first m rows, as many parts as all lie in the span; none if the first does not.
+    /// Returns the coordinates (K, m) of the first m rows, up to a part outside the span; none if that is the first part.
     fn project(&mut self, rows: &[ArrayView2<f64>], range: Range<usize>, threads: Threads) -> Result<Option<Mat<f64>>> {
         let n = rows.iter().map(|columns| columns.ncols()).sum();
         let vectors = self.vectors(n);
@@ -294,7 +294,7 @@ mod tests {
         matrix.nrows()
     }
 
-    /// R has as many rows as the rows have dimensions, also where further ones appear late, for blocks of any size; and N rows
+    /// The number of rows of R is that of the dimensions, also where further ones appear late, for blocks of any size; it is N
     /// after one block of noise.
     #[test]
     fn factor_has_the_dimensions_of_the_rows() {
