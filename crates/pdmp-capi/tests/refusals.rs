@@ -492,7 +492,7 @@ fn damaged_files_and_invalid_settings_leave_null_and_a_message() {
     for damaged in [&bytes[..bytes.len() / 2], b"not a model", &[], &flipped] {
         let (status, model, text) = load(damaged);
         assert_eq!((status, model), (PDMP_FILE, ptr::null_mut()));
-        assert!(text.starts_with("not a usable model file: "), "{text}");
+        assert!(text.starts_with("not a usable file: "), "{text}");
     }
     let mut made = MaybeUninit::uninit();
     // SAFETY: the path ends in a zero byte.

@@ -382,8 +382,8 @@ pub enum Error {
     /// A call that its progress callback cancelled.
     #[error("interrupted")]
     Interrupted,
-    /// A model file that is damaged, foreign or of another version.
-    #[error("not a usable model file: {0}")]
+    /// A file of a model or a partial fit that is damaged, foreign or of another version.
+    #[error("not a usable file: {0}")]
     File(String),
     /// A file that cannot be read or written.
     #[error("{path}: {source}", path = path.display())]
