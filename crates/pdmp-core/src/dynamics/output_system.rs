@@ -185,11 +185,20 @@ impl Propagator {
     /// Returns the state after the step under the forcing w.
     #[inline(always)]
     pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [CubicSample<T>; 2]) -> State<T> {
+        self.advance_by(state, self.respond(forcing))
+    }
+
+    /// Returns the response of the state to the forcing w.
+    #[inline(always)]
+    pub(crate) fn respond<T: Real>(&self, forcing: [CubicSample<T>; 2]) -> State<T> {
+        State { e: hermite_dot(&self.forcing[0], forcing), z: hermite_dot(&self.forcing[1], forcing) }
+    }
+
+    /// Returns the state after the step with a response.
+    #[inline(always)]
+    pub(crate) fn advance_by<T: Real>(&self, state: State<T>, response: State<T>) -> State<T> {
         let [[ee, ez], [ze, zz]] = self.transition;
-        State {
-            e: (state.e * ee + state.z * ez) + hermite_dot(&self.forcing[0], forcing),
-            z: (state.e * ze + state.z * zz) + hermite_dot(&self.forcing[1], forcing),
-        }
+        State { e: (state.e * ee + state.z * ez) + response.e, z: (state.e * ze + state.z * zz) + response.z }
     }
 
     /// Returns the response of the state to the displacement γ of the goal, relative to the goal at the start of the step.

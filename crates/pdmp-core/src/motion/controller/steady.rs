@@ -13,7 +13,6 @@ use super::step::first_element;
 use super::substeps::{MAX_SUBSTEPS, ROUNDING};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSums};
-use crate::dynamics::forcing_table::TableIndex;
 use crate::dynamics::output_system::{CubicSample, Propagator, State};
 use crate::dynamics::transport::TransportSample;
 use crate::model::primitive::Primitive;
@@ -270,7 +269,6 @@ impl SteadyMovements {
         ending: &mut Vec<u32>,
     ) {
         let n_groups = self.n_groups;
-        let last = TableIndex::default();
-        compute_blocks(Steps { movements: self, primitive, tick, mask, rows, ending, last }, n_groups);
+        compute_blocks(Steps { movements: self, primitive, tick, mask, rows, ending }, n_groups);
     }
 }

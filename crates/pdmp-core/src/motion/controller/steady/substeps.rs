@@ -124,7 +124,7 @@ impl Steps<'_, '_> {
         at: usize,
         to: &mut Substeps,
     ) {
-        let Self { movements: SteadyMovements { clocks, amplitudes, .. }, primitive, last, .. } = self;
+        let Self { movements: SteadyMovements { clocks, amplitudes, .. }, primitive, .. } = self;
         if RHYTHMIC && let Canonical::Rhythmic { mu } = primitive.canonical() {
             for i in 0..N {
                 let mut clock = clocks.clock.get(first + i);
@@ -158,13 +158,6 @@ impl Steps<'_, '_> {
         let table = primitive.forcing_table();
         for i in 0..N {
             to.index[at + i] = table.demonstrated_index(u[i]);
-        }
-        for i in 0..N {
-            let index = to.index[at + i];
-            if !index.is_in_cell_of(*last) {
-                table.prefetch_at(index);
-            }
-            *last = index;
         }
     }
 }

@@ -7,7 +7,6 @@ use super::super::group::{Gate, add_frame_motion};
 use super::substeps::{BLOCK, Substeps};
 use super::{Rows, SteadyMovements, SteadyTick};
 use crate::dynamics::canonical::Canonical;
-use crate::dynamics::forcing_table::TableIndex;
 use crate::dynamics::output_system::{CubicSample, State};
 use crate::model::primitive::Primitive;
 use crate::numerics::blocks::{Block, BlockKernel};
@@ -21,8 +20,6 @@ pub(super) struct Steps<'a, 'b> {
     pub(super) mask: Option<&'a [bool]>,
     pub(super) rows: &'a mut Rows<'b>,
     pub(super) ending: &'a mut Vec<u32>,
-    /// Position in the forcing table that was prefetched last.
-    pub(super) last: TableIndex,
 }
 
 impl BlockKernel for Steps<'_, '_> {
@@ -39,7 +36,8 @@ impl BlockKernel for Steps<'_, '_> {
 impl Steps<'_, '_> {
     #[inline(always)]
     fn advance<B: Block, const RHYTHMIC: bool>(&mut self) {
-        let (mut substeps, mut remaining) = (Substeps::default(), [0; BLOCK]);
+        let (mut substeps, mut remaining, mut responses) =
+            (Substeps::default(), [0; BLOCK], [State::<B>::default(); BLOCK]);
         for first in (0..self.movements.clocks.n_substeps.len()).step_by(BLOCK) {
             let is_whole = self.begin_all::<RHYTHMIC>(first, &mut substeps);
             if !is_whole {
@@ -48,7 +46,7 @@ impl Steps<'_, '_> {
             loop {
                 let n =
                     if is_whole { BLOCK } else { self.begin_next::<RHYTHMIC>(first, &mut remaining, &mut substeps) };
-                self.finish::<B, RHYTHMIC>(&substeps, n, is_whole);
+                self.finish::<B, RHYTHMIC>(&substeps, n, is_whole, &mut responses);
                 if is_whole || n == 0 {
                     break;
                 }
@@ -60,50 +58,46 @@ impl Steps<'_, '_> {
     /// follow each other.
     #[inline(always)]
     #[allow(clippy::needless_range_loop)] // See `Kernel`.
-    fn finish<B: Block, const RHYTHMIC: bool>(&mut self, substeps: &Substeps, n: usize, is_whole: bool) {
+    fn finish<B: Block, const RHYTHMIC: bool>(
+        &mut self,
+        substeps: &Substeps,
+        n: usize,
+        is_whole: bool,
+        responses: &mut [State<B>; BLOCK],
+    ) {
         let Self { movements, primitive, rows, .. } = self;
         let n_groups = movements.n_groups;
         let (n_styles, n_dofs, n_pairs) = (primitive.n_styles(), primitive.n_dofs(), n_groups.div_ceil(2));
         let attractor = primitive.attractor();
         let flush_level = B::splat(self.tick.flush_level);
         let n = n.min(BLOCK);
-        let (mut forcing, mut distances) = ([CubicSample::<B>::default(); BLOCK], [B::default(); BLOCK]);
         let mut group = 0;
         while group < n_groups {
-            // Three short loops, of which the processor overlaps more movements than of a long one.
+            // Two short loops, of which the processor overlaps more movements than of a long one.
             // A known number of styles saves a fifth of the first one.
             match n_styles {
-                1 => force::<B, RHYTHMIC, 1>(movements, primitive, substeps, n, group, &mut forcing),
-                2 => force::<B, RHYTHMIC, 2>(movements, primitive, substeps, n, group, &mut forcing),
-                3 => force::<B, RHYTHMIC, 3>(movements, primitive, substeps, n, group, &mut forcing),
-                4 => force::<B, RHYTHMIC, 4>(movements, primitive, substeps, n, group, &mut forcing),
-                _ => force::<B, RHYTHMIC, 0>(movements, primitive, substeps, n, group, &mut forcing),
+                1 => respond::<B, RHYTHMIC, 1>(movements, primitive, substeps, n, group, responses),
+                2 => respond::<B, RHYTHMIC, 2>(movements, primitive, substeps, n, group, responses),
+                3 => respond::<B, RHYTHMIC, 3>(movements, primitive, substeps, n, group, responses),
+                4 => respond::<B, RHYTHMIC, 4>(movements, primitive, substeps, n, group, responses),
+                _ => respond::<B, RHYTHMIC, 0>(movements, primitive, substeps, n, group, responses),
             }
             for i in 0..n {
                 let (place, propagator) = (substeps.place[i], &movements.propagators[substeps.propagator[i] as usize]);
                 let pair = &mut movements.pairs[place * n_pairs + group / 2];
-                let w = CubicSample { value: B::load(&pair.w.value, group), slope: B::load(&pair.w.slope, group) };
-                forcing[i].value.store(&mut pair.w.value, group);
-                forcing[i].slope.store(&mut pair.w.slope, group);
                 let (centre, displacement) = (B::load(&pair.centre, group), B::load(&pair.displacement, group));
                 let (start, origin) =
                     (centre + displacement * substeps.lags[0][i], centre + displacement * substeps.lags[1][i]);
                 let before = State { e: B::load(&pair.position, group) - start, z: B::load(&pair.z, group) };
-                let next = propagator.advance(before, [w, forcing[i]]);
+                let next = propagator.advance_by(before, responses[i]);
                 let (y, z) = (flush(origin + next.e, flush_level), flush(next.z, flush_level));
                 y.store(&mut pair.position, group);
                 z.store(&mut pair.z, group);
-                distances[i] = y - origin;
-            }
-            for i in 0..n {
-                let place = substeps.place[i];
                 let gate = Gate { r: 1.0, r_slope: 0.0, phase_rate: 1.0, rate: [substeps.rate[i], 0.0] };
                 let frame_slopes = [substeps.frame_slopes[0][i], substeps.frame_slopes[1][i]];
-                let pair = &movements.pairs[place * n_pairs + group / 2];
-                let w = add_frame_motion(forcing[i], B::load(&pair.displacement, group), frame_slopes);
-                let state = State { e: distances[i], z: B::load(&pair.z, group) };
-                let [y_dot, y_ddot] = gate.motion(attractor, state, w);
-                let y = B::load(&pair.position, group);
+                let w = CubicSample { value: B::load(&pair.w.value, group), slope: B::load(&pair.w.slope, group) };
+                let w = add_frame_motion(w, displacement, frame_slopes);
+                let [y_dot, y_ddot] = gate.motion(attractor, State { e: y - origin, z }, w);
                 let first = place * n_dofs + group * WIDTH;
                 if is_whole && i + 1 < n && group + B::GROUPS == n_groups {
                     // The lanes beyond the last DoF fall into the next row, which is written next.
@@ -123,30 +117,37 @@ impl Steps<'_, '_> {
     }
 }
 
-/// Evaluates w and w′ of a block of movements; J is the number of styles, or zero for any number.
+/// Evaluates w and w′ of a block of movements at the end of a substep, and the responses of their states to the forcing; J is
+/// the number of styles, or zero for any number.
 #[inline(always)]
 #[allow(clippy::needless_range_loop)] // See `Kernel`.
-fn force<B: Block, const RHYTHMIC: bool, const J: usize>(
-    movements: &SteadyMovements,
+fn respond<B: Block, const RHYTHMIC: bool, const J: usize>(
+    movements: &mut SteadyMovements,
     primitive: &Primitive,
     substeps: &Substeps,
     n: usize,
     group: usize,
-    forcing: &mut [CubicSample<B>; BLOCK],
+    responses: &mut [State<B>; BLOCK],
 ) {
     let (n_styles, table) = (if J == 0 { primitive.n_styles() } else { J }, primitive.forcing_table());
-    let n_style_groups = groups(n_styles);
+    let (n_style_groups, n_pairs) = (groups(n_styles), movements.n_groups.div_ceil(2));
     for i in 0..n.min(BLOCK) {
         let (place, index) = (substeps.place[i], substeps.index[i]);
         let style = unpack(&movements.styles[place * n_style_groups..][..n_style_groups], n_styles);
         let CubicSample { value, slope } = table.sample_block::<B, J>(index, group, style);
         // The slope is one of the sums with zero of `Gate::forcing`, which give zero its sign.
         let slope = slope + B::default();
-        forcing[i] = if RHYTHMIC {
+        let next = if RHYTHMIC {
             let r = [substeps.r[0][i], substeps.r[1][i]];
             CubicSample { value: value * r[0], slope: slope * r[0] + value * r[1] }
         } else {
             CubicSample { value, slope }
         };
+        let propagator = &movements.propagators[substeps.propagator[i] as usize];
+        let pair = &mut movements.pairs[place * n_pairs + group / 2];
+        let w = CubicSample { value: B::load(&pair.w.value, group), slope: B::load(&pair.w.slope, group) };
+        next.value.store(&mut pair.w.value, group);
+        next.slope.store(&mut pair.w.slope, group);
+        responses[i] = propagator.respond([w, next]);
     }
 }
