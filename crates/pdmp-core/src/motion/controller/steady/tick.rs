@@ -99,8 +99,8 @@ impl Steps<'_, '_> {
                 let w = add_frame_motion(w, displacement, frame_slopes);
                 let [y_dot, y_ddot] = gate.motion(attractor, State { e: y - origin, z }, w);
                 let first = place * n_dofs + group * WIDTH;
-                if is_whole && i + 1 < n && group + B::GROUPS == n_groups {
-                    // The lanes beyond the last DoF fall into the next row, which is written next.
+                if is_whole && i + 1 < n && n_groups <= B::GROUPS {
+                    // The lanes beyond the last DoF fall into the next row, all of which is written next.
                     let lanes = first..first + B::GROUPS * WIDTH;
                     y.write_all(&mut rows.position[lanes.clone()]);
                     y_dot.write_all(&mut rows.velocity[lanes.clone()]);
