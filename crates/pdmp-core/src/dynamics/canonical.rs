@@ -81,17 +81,20 @@ impl Canonical {
     }
 }
 
-/// Compensated sums of many movements.
-#[derive(Clone, Debug)]
-pub(crate) struct CompensatedSums {
-    values: Vec<f64>,
-    compensations: Vec<f64>,
+/// Compensated sums of N movements.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CompensatedSums<const N: usize> {
+    values: [f64; N],
+    compensations: [f64; N],
 }
 
-impl CompensatedSums {
-    /// Returns `n` sums of zero.
-    pub(crate) fn zeros(n: usize) -> Self {
-        Self { values: vec![0.0; n], compensations: vec![0.0; n] }
+impl<const N: usize> CompensatedSums<N> {
+    pub(crate) const ZERO: Self = Self { values: [0.0; N], compensations: [0.0; N] };
+
+    /// Returns the sums.
+    #[inline(always)]
+    pub(crate) fn values(&self) -> &[f64; N] {
+        &self.values
     }
 
     /// Returns a sum.
@@ -106,30 +109,15 @@ impl CompensatedSums {
         (self.values[i], self.compensations[i]) = (sum.value, sum.compensation);
     }
 
-    /// Adds a step each to consecutive sums from one on, and returns the sums.
+    /// Adds a step to a sum if `condition`, without a branch, and returns the sum.
     #[inline(always)]
-    #[allow(clippy::needless_range_loop)] // The loop over arrays compiles to vector instructions.
-    pub(crate) fn add_each<const N: usize>(&mut self, first: usize, steps: &[f64; N]) -> [f64; N] {
-        let (Some(values), Some(compensations)) =
-            (self.values[first..].first_chunk_mut::<N>(), self.compensations[first..].first_chunk_mut::<N>())
-        else {
-            return [0.0; N];
-        };
-        // Copies: the compiler cannot exclude that the two overlap.
-        let (mut sums, mut rests) = (*values, *compensations);
-        for i in 0..N {
-            let mut sum = CompensatedSum { value: sums[i], compensation: rests[i] };
-            sum.add(steps[i]);
-            (sums[i], rests[i]) = (sum.value, sum.compensation);
-        }
-        (*values, *compensations) = (sums, rests);
-        sums
-    }
-
-    /// Returns consecutive sums from one on, `None` beyond the last.
-    #[inline(always)]
-    pub(crate) fn block<const N: usize>(&self, first: usize) -> Option<&[f64; N]> {
-        self.values[first..].first_chunk()
+    pub(crate) fn add_if(&mut self, condition: bool, i: usize, step: f64) -> f64 {
+        let before = self.get(i);
+        let mut sum = before;
+        sum.add(step);
+        let sum = if condition { sum } else { before };
+        self.set(i, sum);
+        sum.value
     }
 }
 

@@ -1,22 +1,36 @@
 //! Forcing of blocks of groups, for many movements.
 
-use crate::dynamics::forcing_table::{Cubic, ForcingTable, TableIndex, evaluate};
+use crate::dynamics::forcing_table::{Cubic, ForcingTable, evaluate};
 use crate::dynamics::output_system::CubicSample;
 use crate::numerics::blocks::Block;
 
+/// 2⁵²: sums with it have the nearest integer in their last bits.
+const INTEGERS: f64 = 4_503_599_627_370_496.0;
+
 impl ForcingTable {
+    /// Returns the cell of clock `u` and the clock since its first knot as [`ForcingTable::demonstrated_index`] does, for clocks
+    /// that are not negative, of a rhythmic movement below 2π. Unlike a cast, its operations are those of vectors.
+    #[inline(always)]
+    pub(crate) fn position(&self, u: f64) -> (u32, f64) {
+        let (position, end) = (u * self.cells_per_clock, self.cells as f64);
+        let position = if position < end { position } else { end };
+        let nearest = (position + INTEGERS) - INTEGERS;
+        let knot = if nearest > position { nearest - 1.0 } else { nearest };
+        ((knot + INTEGERS).to_bits() as u32, (position - knot) * self.cell_width)
+    }
+
     /// Returns the forcing of a style and its slope as [`ForcingTable::sample`] does, for the block of groups from `group` on. J is
     /// the number of styles, or zero for any number.
     #[inline(always)]
     pub(crate) fn sample_block<B: Block, const J: usize>(
         &self,
-        index: TableIndex,
+        (cell, t): (u32, f64),
         group: usize,
         style: &[f64],
     ) -> CubicSample<B> {
         // A known number of styles leaves one check of bounds.
         let n_styles = if J == 0 { self.n_styles } else { J };
-        let start = index.first + group * n_styles;
+        let start = cell as usize * self.knot_stride + group * n_styles;
         let (first, rest) = self.cubics[start..start + B::GROUPS * n_styles].split_at(n_styles);
         let second = if B::GROUPS == 2 { rest } else { first };
         let mut sum = [B::default(); 4];
@@ -34,16 +48,16 @@ impl ForcingTable {
                 j += 1;
             }
         }
-        evaluate(sum, index.t)
+        evaluate(B::in_order(sum), t)
     }
 }
 
 /// Adds a weighted cubic to a sum, or begins the sum with it: a sum with zero would change the sign of zero.
 #[inline(always)]
 fn add<B: Block>(sum: &mut [B; 4], first: &Cubic, second: &Cubic, weight: f64, begins: bool) {
-    let mut i = 0;
+    let (cubic, mut i) = (B::load_four(&first.0, &second.0), 0);
     while i < 4 {
-        let product = B::join(&first.0[i], &second.0[i]) * weight;
+        let product = cubic[i] * weight;
         sum[i] = if begins { product } else { sum[i] + product };
         i += 1;
     }

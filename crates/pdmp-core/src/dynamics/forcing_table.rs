@@ -29,12 +29,12 @@ pub struct ForcingTable {
     pub(super) n_styles: usize,
     n_dofs: usize,
     /// Number of cubics at a knot: one for each group of DoFs and style.
-    knot_stride: usize,
-    cells: usize,
+    pub(super) knot_stride: usize,
+    pub(super) cells: usize,
     /// Width of a cell on the clock.
-    cell_width: f64,
+    pub(super) cell_width: f64,
     /// Number of cells per unit of the clock.
-    cells_per_clock: f64,
+    pub(super) cells_per_clock: f64,
     /// By knots, groups of DoFs and styles, so that a tick reads contiguous memory. After the last knot, a and b of
     /// w = r·(a + b·p) past the end.
     pub(super) cubics: Vec<Cubic>,

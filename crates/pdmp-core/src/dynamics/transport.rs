@@ -134,37 +134,41 @@ impl Transport {
         }
     }
 
-    /// Returns the lags ℓ at clocks `u` with their derivatives, each of which has not passed its cell or has passed on from it to
-    /// another, which the cell then is.
+    /// Computes the lags ℓ at clocks `u` and their derivatives. Each clock is in its cell, or has passed on from it to another,
+    /// which the cell then is.
     #[inline(always)]
     #[allow(clippy::needless_range_loop)] // See `Kernel`.
-    pub(crate) fn lags_from<const N: usize>(&self, cells: &mut [u16; N], u: &[f64; N]) -> [[f64; N]; 3] {
-        let (mut lags, common) = ([[0.0; N]; 3], cells[0]);
-        let [from, to] = [0, 1].map(|k| self.width * f64::from(common + k));
-        let mut is_common = true;
+    pub(crate) fn lags_from<const N: usize>(
+        &self,
+        cells: &mut [u32; N],
+        u: &[f64; N],
+        [values, slopes, bends]: [&mut [f64; N]; 3],
+    ) {
+        let (n_cells, mut has_passed) = (self.cubics.len() as u32, false);
         for i in 0..N {
-            is_common &= (cells[i] == common) & (u[i] < to);
+            has_passed |= (cells[i] < n_cells) & (u[i] >= self.width * f64::from(cells[i] + 1));
         }
-        if let Some(cubic) = self.cubics.get(usize::from(common)).filter(|_| is_common) {
+        if has_passed {
+            for i in 0..N {
+                if u[i] >= self.width * f64::from(cells[i] + 1) {
+                    cells[i] = ((u[i] * self.cells_per_clock) as u32).min(n_cells);
+                }
+            }
+        }
+        let cubic = |cell: u32| self.cubics.get(cell as usize).unwrap_or(&[0.0; 4]);
+        if *cells == [cells[0]; N] {
+            let (cubic, from) = (cubic(cells[0]), self.width * f64::from(cells[0]));
             for i in 0..N {
                 let TransportSample { value, slope, bend } = sample(cubic, u[i] - from);
-                (lags[0][i], lags[1][i], lags[2][i]) = (value, slope, bend);
+                (values[i], slopes[i], bends[i]) = (value, slope, bend);
             }
-            return lags;
+        } else {
+            for i in 0..N {
+                let TransportSample { value, slope, bend } =
+                    sample(cubic(cells[i]), u[i] - self.width * f64::from(cells[i]));
+                (values[i], slopes[i], bends[i]) = (value, slope, bend);
+            }
         }
-        for i in 0..N {
-            let at = usize::from(cells[i]);
-            let Some(cubic) = self.cubics.get(at) else { continue };
-            let TransportSample { value, slope, bend } = if u[i] < self.width * (at + 1) as f64 {
-                sample(cubic, u[i] - self.width * at as f64)
-            } else {
-                let segment = self.segment_at(u[i]);
-                cells[i] = self.cell(&segment) as u16;
-                segment.lag(u[i])
-            };
-            (lags[0][i], lags[1][i], lags[2][i]) = (value, slope, bend);
-        }
-        lags
     }
 
     /// Returns the lag ℓ at clock `u`.

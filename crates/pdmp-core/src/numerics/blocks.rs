@@ -16,8 +16,10 @@ pub(crate) trait Block: Real {
     fn load(line: &Line, group: usize) -> Self;
     /// Writes one of the groups of a line, or both.
     fn store(self, line: &mut Line, group: usize);
-    /// Loads a group, and another if there are two.
-    fn join(first: &F64x4, second: &F64x4) -> Self;
+    /// Loads four numbers of each lane of a group, and those of another if there are two, in an order for sums.
+    fn load_four(first: &[F64x4; 4], second: &[F64x4; 4]) -> [Self; 4];
+    /// Returns the four numbers of all lanes from what `load_four` loads, or from sums of it.
+    fn in_order(four: [Self; 4]) -> [Self; 4];
     /// Returns a register with the same value in all lanes.
     fn splat(value: f64) -> Self;
     /// Writes the lanes to a slice of that length or less.
@@ -43,8 +45,16 @@ macro_rules! blocks_of_one_group {
             }
 
             #[inline(always)]
-            fn join(first: &$crate::numerics::simd::F64x4, _: &$crate::numerics::simd::F64x4) -> Self {
-                $crate::numerics::simd::Register::load(first)
+            fn load_four(
+                [a, b, c, d]: &[$crate::numerics::simd::F64x4; 4],
+                _: &[$crate::numerics::simd::F64x4; 4],
+            ) -> [Self; 4] {
+                $crate::numerics::simd::Register::load_all([a, b, c, d])
+            }
+
+            #[inline(always)]
+            fn in_order(four: [Self; 4]) -> [Self; 4] {
+                four
             }
 
             #[inline(always)]
