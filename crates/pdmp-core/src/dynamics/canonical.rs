@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 
 use crate::error::Result;
 use crate::kind::Kind;
+use crate::numerics::blocks::Block;
 use crate::numerics::state::{Visitor, visit_number};
 use serde::{Deserialize, Serialize};
 
@@ -109,15 +110,31 @@ impl<const N: usize> CompensatedSums<N> {
         (self.values[i], self.compensations[i]) = (sum.value, sum.compensation);
     }
 
-    /// Adds a step to a sum if `condition`, without a branch, and returns the sum.
+    /// Adds a step to a sum and returns it.
     #[inline(always)]
-    pub(crate) fn add_if(&mut self, condition: bool, i: usize, step: f64) -> f64 {
-        let before = self.get(i);
-        let mut sum = before;
+    pub(crate) fn add(&mut self, i: usize, step: f64) -> f64 {
+        let mut sum = self.get(i);
         sum.add(step);
-        let sum = if condition { sum } else { before };
         self.set(i, sum);
         sum.value
+    }
+
+    /// Wraps an angle to [0, 2π) and returns it.
+    #[inline(always)]
+    pub(crate) fn wrap(&mut self, i: usize) -> f64 {
+        self.values[i] = turn(self.values[i]);
+        self.values[i]
+    }
+
+    /// Adds a step each to the sums from `first` on that fill a register, and returns these.
+    #[inline(always)]
+    pub(crate) fn add_block<B: Block>(&mut self, first: usize, step: B) -> B {
+        let [sums, rests] = [&mut self.values[first..], &mut self.compensations[first..]];
+        let (before, step) = (B::read_all(sums), step + B::read_all(rests));
+        let sum = before + step;
+        sum.write_all(sums);
+        (step - (sum - before)).write_all(rests);
+        sum
     }
 }
 

@@ -4,19 +4,21 @@ use crate::dynamics::forcing_table::{Cubic, ForcingTable, evaluate};
 use crate::dynamics::output_system::CubicSample;
 use crate::numerics::blocks::Block;
 
-/// 2⁵²: sums with it have the nearest integer in their last bits.
-const INTEGERS: f64 = 4_503_599_627_370_496.0;
-
 impl ForcingTable {
-    /// Returns the cell of clock `u` and the clock since its first knot as [`ForcingTable::demonstrated_index`] does, for clocks
-    /// that are not negative, of a rhythmic movement below 2π. Unlike a cast, its operations are those of vectors.
+    /// Returns the cells of clocks `u` and the clocks since their first knots, for clocks from 0 to the end.
     #[inline(always)]
-    pub(crate) fn position(&self, u: f64) -> (u32, f64) {
-        let (position, end) = (u * self.cells_per_clock, self.cells as f64);
-        let position = if position < end { position } else { end };
-        let nearest = (position + INTEGERS) - INTEGERS;
-        let knot = if nearest > position { nearest - 1.0 } else { nearest };
-        ((knot + INTEGERS).to_bits() as u32, (position - knot) * self.cell_width)
+    pub(crate) fn positions<B: Block>(&self, u: B) -> [B; 2] {
+        let position = u * self.cells_per_clock;
+        let cell = position.floor();
+        [cell, (position - cell) * self.cell_width]
+    }
+
+    /// Returns the cell of clock `u` and the clock since its first knot, as [`ForcingTable::demonstrated_index`] does.
+    #[inline(always)]
+    pub(crate) fn position(&self, u: f64) -> [f64; 2] {
+        let position = u * self.cells_per_clock;
+        let cell = f64::from(position as u32);
+        if cell < self.cells as f64 { [cell, (position - cell) * self.cell_width] } else { [self.cells as f64, 0.0] }
     }
 
     /// Returns the forcing of a style and its slope as [`ForcingTable::sample`] does, for the block of groups from `group` on. J is
@@ -24,13 +26,13 @@ impl ForcingTable {
     #[inline(always)]
     pub(crate) fn sample_block<B: Block, const J: usize>(
         &self,
-        (cell, t): (u32, f64),
+        [cell, t]: [f64; 2],
         group: usize,
         style: &[f64],
     ) -> CubicSample<B> {
         // A known number of styles leaves one check of bounds.
         let n_styles = if J == 0 { self.n_styles } else { J };
-        let start = cell as usize * self.knot_stride + group * n_styles;
+        let start = cell as u32 as usize * self.knot_stride + group * n_styles;
         let (first, rest) = self.cubics[start..start + B::GROUPS * n_styles].split_at(n_styles);
         let second = if B::GROUPS == 2 { rest } else { first };
         let mut sum = [B::default(); 4];

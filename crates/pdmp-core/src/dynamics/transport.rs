@@ -12,8 +12,12 @@
 //! A learnt profile is a uniform cubic B-spline: C², non-decreasing as its coefficients are, and constant to second order
 //! at both ends, where three coefficients are equal.
 
+use std::ops::Mul;
+
 use crate::dynamics::canonical::Canonical;
 use crate::error::{Error, Result};
+use crate::numerics::blocks::Block;
+use crate::numerics::simd::Real;
 
 /// Minimum number of cells: three coefficients are 0, three are 1, and at least one lies between them.
 pub(crate) const MIN_CELLS: usize = 4;
@@ -46,10 +50,10 @@ pub(crate) struct TransportSegment {
 
 /// Lag ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct TransportSample {
-    pub(crate) value: f64,
-    pub(crate) slope: f64,
-    pub(crate) bend: f64,
+pub(crate) struct TransportSample<T = f64> {
+    pub(crate) value: T,
+    pub(crate) slope: T,
+    pub(crate) bend: T,
 }
 
 impl Transport {
@@ -138,36 +142,36 @@ impl Transport {
     /// which the cell then is.
     #[inline(always)]
     #[allow(clippy::needless_range_loop)] // See `Kernel`.
-    pub(crate) fn lags_from<const N: usize>(
+    pub(crate) fn lags_from<B: Block, const N: usize>(
         &self,
         cells: &mut [u32; N],
         u: &[f64; N],
         [values, slopes, bends]: [&mut [f64; N]; 3],
     ) {
-        let (n_cells, mut has_passed) = (self.cubics.len() as u32, false);
-        for i in 0..N {
-            has_passed |= (cells[i] < n_cells) & (u[i] >= self.width * f64::from(cells[i] + 1));
-        }
-        if has_passed {
-            for i in 0..N {
-                if u[i] >= self.width * f64::from(cells[i] + 1) {
-                    cells[i] = ((u[i] * self.cells_per_clock) as u32).min(n_cells);
-                }
-            }
-        }
+        let (n_cells, common) = (self.cubics.len() as u32, cells[0]);
         let cubic = |cell: u32| self.cubics.get(cell as usize).unwrap_or(&[0.0; 4]);
-        if *cells == [cells[0]; N] {
-            let (cubic, from) = (cubic(cells[0]), self.width * f64::from(cells[0]));
-            for i in 0..N {
-                let TransportSample { value, slope, bend } = sample(cubic, u[i] - from);
-                (values[i], slopes[i], bends[i]) = (value, slope, bend);
+        let [from, to] = [self.width * f64::from(common), self.width * f64::from(common + 1)];
+        let mut is_common = *cells == [common; N];
+        for i in 0..N {
+            is_common &= (u[i] < to) | (common >= n_cells);
+        }
+        if is_common {
+            let &[value, slope, square, cube] = cubic(common);
+            let cubic = [B::splat(value), B::splat(slope), B::splat(square), B::splat(cube)];
+            for first in (0..N).step_by(B::LANES) {
+                let TransportSample { value, slope, bend } = sample(&cubic, B::read_all(&u[first..]) - B::splat(from));
+                value.write_all(&mut values[first..]);
+                slope.write_all(&mut slopes[first..]);
+                bend.write_all(&mut bends[first..]);
             }
-        } else {
-            for i in 0..N {
-                let TransportSample { value, slope, bend } =
-                    sample(cubic(cells[i]), u[i] - self.width * f64::from(cells[i]));
-                (values[i], slopes[i], bends[i]) = (value, slope, bend);
+            return;
+        }
+        for i in 0..N {
+            if u[i] >= self.width * f64::from(cells[i] + 1) {
+                cells[i] = ((u[i] * self.cells_per_clock) as u32).min(n_cells);
             }
+            let sample = sample(cubic(cells[i]), u[i] - self.width * f64::from(cells[i]));
+            (values[i], slopes[i], bends[i]) = (sample.value, sample.slope, sample.bend);
         }
     }
 
@@ -198,13 +202,13 @@ impl TransportSegment {
 
 /// Evaluates a cubic and its derivatives.
 #[inline(always)]
-fn sample([value, slope, square, cube]: &[f64; 4], t: f64) -> TransportSample {
+fn sample<T: Real + Mul<Output = T>>(&[value, slope, square, cube]: &[T; 4], t: T) -> TransportSample<T> {
     let rest = cube * t;
     let bend = square + rest;
     let twice = bend + bend;
     TransportSample {
         value: value + t * (slope + t * bend),
         slope: slope + t * (twice + rest),
-        bend: twice + 4.0 * rest,
+        bend: twice + rest * 4.0f64,
     }
 }

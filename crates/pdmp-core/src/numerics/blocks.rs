@@ -1,6 +1,8 @@
 //! Registers of one or two groups of DoFs, for loops over many movements.
 
-use crate::numerics::simd::{F64x4, Real};
+use std::ops::Mul;
+
+use crate::numerics::simd::{F64x4, Real, WIDTH};
 
 /// Two groups in one line of the cache.
 #[derive(Clone, Copy, Debug, Default)]
@@ -8,9 +10,11 @@ use crate::numerics::simd::{F64x4, Real};
 pub(crate) struct Line(pub(crate) [F64x4; 2]);
 
 /// Register of consecutive groups.
-pub(crate) trait Block: Real {
+pub(crate) trait Block: Real + Mul<Output = Self> {
     /// Number of groups, one or two.
     const GROUPS: usize;
+    /// Number of lanes.
+    const LANES: usize = Self::GROUPS * WIDTH;
 
     /// Loads one of the groups of a line, or both if there are two.
     fn load(line: &Line, group: usize) -> Self;
@@ -24,6 +28,10 @@ pub(crate) trait Block: Real {
     fn splat(value: f64) -> Self;
     /// Writes the lanes to a slice of that length or less.
     fn write(self, numbers: &mut [f64]);
+    /// Returns the first numbers of a slice, zero if there are fewer than lanes.
+    fn read_all(numbers: &[f64]) -> Self;
+    /// Returns the largest integers that are not larger than the lanes.
+    fn floor(self) -> Self;
     /// Writes all lanes to the first numbers of a slice.
     fn write_all(self, numbers: &mut [f64]);
 }
@@ -65,6 +73,19 @@ macro_rules! blocks_of_one_group {
             #[inline(always)]
             fn write(self, numbers: &mut [f64]) {
                 $crate::numerics::simd::unpad($crate::numerics::simd::Register::store(self), numbers);
+            }
+
+            #[inline(always)]
+            fn read_all(numbers: &[f64]) -> Self {
+                match numbers.first_chunk() {
+                    Some(four) => $crate::numerics::simd::Register::load_numbers(four),
+                    None => Self::default(),
+                }
+            }
+
+            #[inline(always)]
+            fn floor(self) -> Self {
+                self.floor()
             }
 
             #[inline(always)]

@@ -4,13 +4,14 @@ use super::super::substeps::ROUNDING;
 use super::{BLOCK, SteadyBlock};
 use crate::dynamics::canonical::{Canonical, amplitude};
 use crate::model::primitive::Primitive;
+use crate::numerics::blocks::Block;
 
 /// Substep of the movements of a block.
 pub(super) struct Substep {
     /// Whether a movement takes the substep.
     pub(super) is_active: [bool; BLOCK],
     /// Cell of the forcing table at the end, and the clock since its first knot.
-    pub(super) cell: [u32; BLOCK],
+    pub(super) cell: [f64; BLOCK],
     pub(super) t: [f64; BLOCK],
     /// Amplitude r′ at the end.
     pub(super) amplitude_slope: [f64; BLOCK],
@@ -22,7 +23,7 @@ pub(super) struct Substep {
 impl Substep {
     pub(super) const EMPTY: Self = Self {
         is_active: [false; BLOCK],
-        cell: [0; BLOCK],
+        cell: [0.0; BLOCK],
         t: [0.0; BLOCK],
         amplitude_slope: [0.0; BLOCK],
         lag: [0.0; BLOCK],
@@ -30,13 +31,14 @@ impl Substep {
     };
 }
 
-// Loops without branches over whole blocks compile to vector instructions.
-#[allow(clippy::needless_range_loop)]
+// Blocks that move as a whole are advanced in registers: loops over arrays are no vector instructions in the wheel, of which the
+// last pass optimises for size.
+#[allow(clippy::needless_range_loop)] // See `Kernel`.
 impl SteadyBlock {
     /// Begins a tick of the movements that are steady, of this tick and before their end. Returns their numbers of substeps, zero
     /// for the others, and adds those at their end to `ending`. The block begins with place `first`.
     #[inline(always)]
-    pub(super) fn begin(
+    pub(super) fn begin<B: Block>(
         &mut self,
         first: usize,
         canonical: Canonical,
@@ -61,41 +63,53 @@ impl SteadyBlock {
                 ending.push((first + i) as u32);
             }
         }
-        for i in 0..BLOCK {
-            self.time.add_if(remaining[i] > 0, i, dt);
+        if remaining == [1; BLOCK] {
+            for i in (0..BLOCK).step_by(B::LANES) {
+                self.time.add_block(i, B::splat(dt));
+            }
+        } else {
+            for i in (0..BLOCK).filter(|i| remaining[*i] > 0) {
+                self.time.add(i, dt);
+            }
         }
         remaining
     }
 
     /// Advances the clocks of the movements with remaining substeps by one of these.
     #[inline(always)]
-    pub(super) fn advance<const RHYTHMIC: bool>(
+    pub(super) fn advance<B: Block, const RHYTHMIC: bool>(
         &mut self,
         remaining: &mut [u32; BLOCK],
         primitive: &Primitive,
         substep: &mut Substep,
     ) {
-        let table = primitive.forcing_table();
+        let (table, canonical) = (primitive.forcing_table(), primitive.canonical());
         substep.lag = self.lag;
-        for i in 0..BLOCK {
-            let is_active = remaining[i] > 0;
-            substep.is_active[i] = is_active;
-            remaining[i] -= u32::from(is_active);
-            let u = self.clock.add_if(is_active, i, self.h[i]);
-            (substep.cell[i], substep.t[i]) = table.position(u);
-        }
-        if RHYTHMIC && let Canonical::Rhythmic { mu } = primitive.canonical() {
-            for i in (0..BLOCK).filter(|i| substep.is_active[*i]) {
-                let mut clock = self.clock.get(i);
-                clock.wrap();
-                self.clock.set(i, clock);
-                (substep.cell[i], substep.t[i]) = table.position(clock.value());
-                let [r, target] = [self.amplitude[0][i], self.amplitude[1][i]];
-                self.amplitude[0][i] = amplitude(mu, r, target, self.h[i]);
-                substep.amplitude_slope[i] = mu * (target - self.amplitude[0][i]);
+        if !RHYTHMIC && *remaining == [1; BLOCK] {
+            (substep.is_active, *remaining) = ([true; BLOCK], [0; BLOCK]);
+            for i in (0..BLOCK).step_by(B::LANES) {
+                let [cell, t] = table.positions(self.clock.add_block(i, B::read_all(&self.h[i..])));
+                cell.write_all(&mut substep.cell[i..]);
+                t.write_all(&mut substep.t[i..]);
+            }
+        } else {
+            for i in 0..BLOCK {
+                substep.is_active[i] = remaining[i] > 0;
+                if !substep.is_active[i] {
+                    continue;
+                }
+                remaining[i] -= 1;
+                let mut u = self.clock.add(i, self.h[i]);
+                if RHYTHMIC && let Canonical::Rhythmic { mu } = canonical {
+                    u = self.clock.wrap(i);
+                    let [r, target] = [self.amplitude[0][i], self.amplitude[1][i]];
+                    self.amplitude[0][i] = amplitude(mu, r, target, self.h[i]);
+                    substep.amplitude_slope[i] = mu * (target - self.amplitude[0][i]);
+                }
+                [substep.cell[i], substep.t[i]] = table.position(u);
             }
         }
         let [slopes, bends] = &mut substep.frame_slopes;
-        primitive.transport.lags_from(&mut self.cell, self.clock.values(), [&mut self.lag, slopes, bends]);
+        primitive.transport.lags_from::<B, BLOCK>(&mut self.cell, self.clock.values(), [&mut self.lag, slopes, bends]);
     }
 }

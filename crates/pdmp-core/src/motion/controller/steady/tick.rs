@@ -55,9 +55,9 @@ impl Steps<'_, '_> {
         let (mut substep, mut forcing) = (Substep::EMPTY, [CubicSample::<B>::default(); BLOCK]);
         for (index, (block, (pairs, styles))) in blocks.iter_mut().zip(vectors).enumerate() {
             let first = index * BLOCK;
-            let mut remaining = block.begin(first, primitive.canonical(), dt, self.mask, self.ending);
+            let mut remaining = block.begin::<B>(first, primitive.canonical(), dt, self.mask, self.ending);
             while remaining != [0; BLOCK] {
-                block.advance::<RHYTHMIC>(&mut remaining, primitive, &mut substep);
+                block.advance::<B, RHYTHMIC>(&mut remaining, primitive, &mut substep);
                 for group in (0..*n_groups).step_by(B::GROUPS) {
                     let part = Part { block, substep: &substep, primitive, first, group };
                     // Two short loops, of which the processor overlaps more movements than of a long one.
@@ -94,7 +94,7 @@ impl Part<'_> {
             }
             let style = unpack(style, n_styles);
             let CubicSample { value, slope } =
-                table.sample_block::<B, J>((substep.cell[i], substep.t[i]), group, style);
+                table.sample_block::<B, J>([substep.cell[i], substep.t[i]], group, style);
             // The slope is one of the sums with zero of `Gate::forcing`, which give zero its sign.
             let slope = slope + B::default();
             forcing[i] = if RHYTHMIC {
