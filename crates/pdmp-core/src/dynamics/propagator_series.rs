@@ -115,10 +115,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn weights(p: &Propagator) -> Vec<f64> {
-        p.transition
+        p.resting
+            .transition
             .as_flattened()
             .iter()
-            .chain(p.forcing.as_flattened())
+            .chain(p.resting.forcing.as_flattened())
             .chain(p.goal.as_flattened())
             .copied()
             .collect()

@@ -8,7 +8,7 @@ use crate::numerics::blocks::Block;
 
 /// Substep of the movements of a block.
 pub(super) struct Substep {
-    /// Whether a movement takes the substep.
+    /// True for a movement that takes the substep.
     pub(super) is_active: [bool; BLOCK],
     /// Cell of the forcing table at the end, and the clock since its first knot.
     pub(super) cell: [f64; BLOCK],
