@@ -17,7 +17,7 @@ use std::ops::Mul;
 use crate::dynamics::canonical::Canonical;
 use crate::error::{Error, Result};
 use crate::numerics::blocks::Block;
-use crate::numerics::simd::Real;
+use crate::numerics::simd::{Real, Register, WIDTH};
 
 /// Minimum number of cells: three coefficients are 0, three are 1, and at least one lies between them.
 pub(crate) const MIN_CELLS: usize = 4;
@@ -54,6 +54,40 @@ pub(crate) struct TransportSample<T = f64> {
     pub(crate) value: T,
     pub(crate) slope: T,
     pub(crate) bend: T,
+}
+
+/// Cells of N clocks, and the clocks at their ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TransportCells<const N: usize> {
+    cell: [u32; N],
+    from: [f64; N],
+    to: [f64; N],
+}
+
+impl<const N: usize> TransportCells<N> {
+    pub(crate) const FIRST: Self = Self { cell: [0; N], from: [0.0; N], to: [f64::INFINITY; N] };
+
+    /// Returns a cell.
+    pub(crate) fn get(&self, i: usize) -> usize {
+        self.cell[i] as usize
+    }
+
+    /// Sets a cell to that of an interval.
+    pub(crate) fn set(&mut self, i: usize, segment: &TransportSegment, transport: &Transport) {
+        // A profile has far fewer cells.
+        self.cell[i] = transport.cell(segment) as u32;
+        (self.from[i], self.to[i]) = (segment.from, segment.to);
+    }
+}
+
+impl<B: Block> TransportSample<B> {
+    /// Writes the lanes to arrays of values, slopes and bends from `first` on.
+    #[inline(always)]
+    fn write_all<const N: usize>(self, [values, slopes, bends]: &mut [&mut [f64; N]; 3], first: usize) {
+        self.value.write_all(&mut values[first..]);
+        self.slope.write_all(&mut slopes[first..]);
+        self.bend.write_all(&mut bends[first..]);
+    }
 }
 
 impl Transport {
@@ -141,37 +175,42 @@ impl Transport {
     /// Computes the lags ℓ at clocks `u` and their derivatives. Each clock is in its cell, or has passed on from it to another,
     /// which the cell then is.
     #[inline(always)]
-    #[allow(clippy::needless_range_loop)] // See `Kernel`.
     pub(crate) fn lags_from<B: Block, const N: usize>(
         &self,
-        cells: &mut [u32; N],
+        cells: &mut TransportCells<N>,
         u: &[f64; N],
-        [values, slopes, bends]: [&mut [f64; N]; 3],
+        mut lags: [&mut [f64; N]; 3],
     ) {
-        let (n_cells, common) = (self.cubics.len() as u32, cells[0]);
+        for first in (0..N).step_by(WIDTH) {
+            let (now, to) = (B::Group::read_all(&u[first..]), B::Group::read_all(&cells.to[first..]));
+            if to.simd_le(now).to_bitmask() != 0 {
+                for i in first..N.min(first + WIDTH) {
+                    if u[i] >= cells.to[i] {
+                        cells.set(i, &self.segment_at(u[i]), self);
+                    }
+                }
+            }
+        }
         let cubic = |cell: u32| self.cubics.get(cell as usize).unwrap_or(&[0.0; 4]);
-        let [from, to] = [self.width * f64::from(common), self.width * f64::from(common + 1)];
-        let mut is_common = *cells == [common; N];
-        for i in 0..N {
-            is_common &= (u[i] < to) | (common >= n_cells);
-        }
-        if is_common {
-            let &[value, slope, square, cube] = cubic(common);
-            let cubic = [B::splat(value), B::splat(slope), B::splat(square), B::splat(cube)];
+        if cells.cell == [cells.cell[0]; N] {
+            let &[value, slope, square, cube] = cubic(cells.cell[0]);
+            let (cubic, from) =
+                ([B::splat(value), B::splat(slope), B::splat(square), B::splat(cube)], B::splat(cells.from[0]));
             for first in (0..N).step_by(B::LANES) {
-                let TransportSample { value, slope, bend } = sample(&cubic, B::read_all(&u[first..]) - B::splat(from));
-                value.write_all(&mut values[first..]);
-                slope.write_all(&mut slopes[first..]);
-                bend.write_all(&mut bends[first..]);
+                sample(&cubic, B::read_all(&u[first..]) - from).write_all(&mut lags, first);
             }
-            return;
-        }
-        for i in 0..N {
-            if u[i] >= self.width * f64::from(cells[i] + 1) {
-                cells[i] = ((u[i] * self.cells_per_clock) as u32).min(n_cells);
+        } else {
+            for (first, cell) in (0..N).step_by(WIDTH).zip(cells.cell.as_chunks().0) {
+                let &[a, b, c, d]: &[u32; WIDTH] = cell;
+                let cubic = B::Group::transpose([
+                    B::Group::load_numbers(cubic(a)),
+                    B::Group::load_numbers(cubic(b)),
+                    B::Group::load_numbers(cubic(c)),
+                    B::Group::load_numbers(cubic(d)),
+                ]);
+                let t = B::Group::read_all(&u[first..]) - B::Group::read_all(&cells.from[first..]);
+                sample(&cubic, t).write_all(&mut lags, first);
             }
-            let sample = sample(cubic(cells[i]), u[i] - self.width * f64::from(cells[i]));
-            (values[i], slopes[i], bends[i]) = (sample.value, sample.slope, sample.bend);
         }
     }
 

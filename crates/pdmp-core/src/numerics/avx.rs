@@ -114,6 +114,8 @@ impl Mul<f64> for Avx512 {
 impl Real for Avx512 {}
 
 impl Block for Avx512 {
+    type Group = Avx2;
+
     const GROUPS: usize = 2;
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use std::ops::Mul;
 
-use crate::numerics::simd::{F64x4, Real, WIDTH};
+use crate::numerics::simd::{F64x4, Real, Register, WIDTH};
 
 /// Two groups in one line of the cache.
 #[derive(Clone, Copy, Debug, Default)]
@@ -11,6 +11,9 @@ pub(crate) struct Line(pub(crate) [F64x4; 2]);
 
 /// Register of consecutive groups.
 pub(crate) trait Block: Real + Mul<Output = Self> {
+    /// Register of one group.
+    type Group: Block + Register;
+
     /// Number of groups, one or two.
     const GROUPS: usize;
     /// Number of lanes.
@@ -40,6 +43,8 @@ pub(crate) trait Block: Real + Mul<Output = Self> {
 macro_rules! blocks_of_one_group {
     ($register:ty) => {
         impl $crate::numerics::blocks::Block for $register {
+            type Group = Self;
+
             const GROUPS: usize = 1;
 
             #[inline(always)]

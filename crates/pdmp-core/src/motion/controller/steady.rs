@@ -14,7 +14,7 @@ use super::substeps::{MAX_SUBSTEPS, ROUNDING};
 use super::{Controller, Status};
 use crate::dynamics::canonical::{Canonical, CompensatedSums};
 use crate::dynamics::output_system::{CubicSample, RestingPropagator, State};
-use crate::dynamics::transport::TransportSample;
+use crate::dynamics::transport::{TransportCells, TransportSample};
 use crate::model::primitive::Primitive;
 use crate::motion::command::Command;
 use crate::numerics::blocks::{Block, Line, compute_blocks};
@@ -37,8 +37,8 @@ struct SteadyBlock {
     lag: [f64; BLOCK],
     /// Amplitudes r, and their commands r₀.
     amplitude: [[f64; BLOCK]; 2],
-    /// Cell of the transport profile.
-    cell: [u32; BLOCK],
+    /// Cells of the transport profile.
+    cells: TransportCells<BLOCK>,
     /// Number of substeps of a tick, zero for an empty place.
     n_substeps: [u32; BLOCK],
     propagators: [RestingPropagator; BLOCK],
@@ -147,7 +147,7 @@ impl SteadyMovements {
             h: numbers,
             lag: numbers,
             amplitude: [numbers; 2],
-            cell: [0; BLOCK],
+            cells: TransportCells::FIRST,
             n_substeps: [0; BLOCK],
             propagators: [controller.propagator.resting; BLOCK],
         };
@@ -183,8 +183,8 @@ impl SteadyMovements {
         block.h[i] = controller.propagator.step();
         block.lag[i] = controller.frame_lag;
         (block.amplitude[0][i], block.amplitude[1][i]) = (controller.r, first_element(controller.amplitude.value()));
-        // Both have far smaller bounds: the cells of a profile, and the substeps of a tick.
-        block.cell[i] = controller.primitive.transport.cell(&controller.transport_segment) as u32;
+        block.cells.set(i, &controller.transport_segment, &controller.primitive.transport);
+        // A tick has far fewer substeps.
         block.n_substeps[i] = controller.steady_substeps() as u32;
         block.propagators[i] = controller.propagator.resting;
         let style = controller.style.value();
@@ -214,7 +214,7 @@ impl SteadyMovements {
         let (time, clock) = (block.time.get(i), block.clock.get(i));
         let (r, lag) = (block.amplitude[0][i], block.lag[i]);
         (controller.time, controller.clock, controller.r, controller.frame_lag) = (time, clock, r, lag);
-        controller.transport_segment = controller.primitive.transport.segment_of_cell(block.cell[i] as usize);
+        controller.transport_segment = controller.primitive.transport.segment_of_cell(block.cells.get(i));
         controller.read_forcing();
         let (gate, attractor) = (controller.gate(), controller.primitive.attractor());
         let TransportSample { slope, bend, .. } = controller.transport_segment.lag(clock.value());

@@ -110,6 +110,6 @@ impl SteadyBlock {
             }
         }
         let [slopes, bends] = &mut substep.frame_slopes;
-        primitive.transport.lags_from::<B, BLOCK>(&mut self.cell, self.clock.values(), [&mut self.lag, slopes, bends]);
+        primitive.transport.lags_from::<B, BLOCK>(&mut self.cells, self.clock.values(), [&mut self.lag, slopes, bends]);
     }
 }
