@@ -184,9 +184,9 @@ impl Transport {
         for first in (0..N).step_by(WIDTH) {
             let (now, to) = (B::Group::read_all(&u[first..]), B::Group::read_all(&cells.to[first..]));
             if to.simd_le(now).to_bitmask() != 0 {
-                for i in first..N.min(first + WIDTH) {
-                    if u[i] >= cells.to[i] {
-                        cells.set(i, &self.segment_at(u[i]), self);
+                for (i, &u) in u.iter().enumerate().skip(first).take(WIDTH) {
+                    if u >= cells.to[i] {
+                        cells.set(i, &self.segment_at(u), self);
                     }
                 }
             }
