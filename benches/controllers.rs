@@ -1,6 +1,7 @@
 //! Time of a tick of 4096 movements, D = 7 and J = 3: together, and as single controllers.
 //!
-//! The movements are at one clock, as environments that were reset together, or at clocks over the whole movement.
+//! The movements are at one clock, as environments that were reset together, at clocks over the whole movement, or have durations
+//! of their own, between 0.8 and 1.5 of the model's.
 #![allow(missing_docs)]
 
 mod control_loop;
@@ -12,7 +13,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use pdmp_core::motion::{Commands, Controllers, Motions};
 use pdmp_core::numerics::Threads;
-use pdmp_core::{Command, Conditions, Controller, Motion};
+use pdmp_core::{Command, Conditions, Controller, Model, Motion};
 
 const N: usize = 4096;
 const D: usize = 7;
@@ -22,6 +23,12 @@ const TICKS: usize = 300;
 /// Returns the ticks before the measured ones, of movement `b`.
 fn warm_up(b: usize, spread: bool) -> usize {
     if spread { 5 + 600 * b / N } else { 300 }
+}
+
+/// Returns the conditions of movement `b`: durations of neighbours differ, as the golden section spreads them.
+fn conditions(b: usize, model: &Model, has_own_tau: bool) -> Conditions {
+    let tau = model.tau() * (0.8 + 0.7 * (b as f64 * 0.618_033_988_749_895).fract());
+    Conditions { tau: has_own_tau.then_some(tau), ..Conditions::default() }
 }
 
 /// Movements that can be stepped and restarted.
@@ -92,9 +99,11 @@ fn controllers(criterion: &mut Criterion) {
     let goals = Array2::from_shape_fn((N, D), |(b, d)| 1.0 + 1e-4 * b as f64 + 0.1 * d as f64);
     let mut group = criterion.benchmark_group("tick of 4096 movements, D=7 J=3");
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(1));
-    for (clocks, spread) in [("one clock", false), ("spread clocks", true)] {
-        let mut controllers =
-            Controllers::new(model.primitive(), 1e-3, &vec![Conditions::default(); N], None).expect("some");
+    for (clocks, spread, has_own_tau) in
+        [("one clock", false, false), ("spread clocks", true, false), ("own durations", false, true)]
+    {
+        let conditions: Vec<_> = (0..N).map(|b| conditions(b, &model, has_own_tau)).collect();
+        let mut controllers = Controllers::new(model.primitive(), 1e-3, &conditions, None).expect("some");
         let mut together = rows();
         for k in 0..warm_up(N, spread) {
             let mask: Vec<bool> = (0..N).map(|b| k < warm_up(b, spread)).collect();
@@ -104,8 +113,9 @@ fn controllers(criterion: &mut Criterion) {
         let several = Threads::new(2).expect("some");
         let on_two = Together { controllers: controllers.clone().with_threads(several), rows: together.clone() };
         let together = Together { controllers, rows: together };
-        let mut alone: Vec<_> = (0..N)
-            .map(|_| Controller::new(model.primitive(), 1e-3, &Conditions::default(), None).expect("one"))
+        let mut alone: Vec<_> = conditions
+            .iter()
+            .map(|conditions| Controller::new(model.primitive(), 1e-3, conditions, None).expect("one"))
             .collect();
         for (b, controller) in alone.iter_mut().enumerate() {
             (0..warm_up(b, spread)).for_each(|_| {

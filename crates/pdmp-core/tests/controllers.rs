@@ -310,6 +310,27 @@ fn movements_become_steady() {
     }
 }
 
+/// The rows of whole blocks are those of single controllers, with registers that the degrees of freedom fill and that they do not.
+#[test]
+fn rows_of_whole_blocks_are_complete() {
+    for n_dofs in [1, 4, 5, 7, 8, 10, 12, 14, 16, 18] {
+        let model = wide(&reaches(), n_dofs);
+        let (dt, all) = (1e-3 * model.tau(), vec![Conditions::default(); N]);
+        let mut together = Controllers::new(model.primitive(), dt, &all, None).unwrap();
+        let mut alone = Controller::new(model.primitive(), dt, &all[0], None).unwrap();
+        let mut rows = Rows::new(&model);
+        for _ in 0..20 {
+            together.step(None, &mut rows.motions()).unwrap();
+            alone.step().unwrap();
+            let expected = [alone.position(), alone.velocity(), alone.acceleration()];
+            for (found, expected) in [&rows.position, &rows.velocity, &rows.acceleration].into_iter().zip(expected) {
+                assert!(found.chunks(n_dofs).all(|row| row == expected), "{n_dofs}");
+            }
+        }
+        assert_eq!(together.n_steady(), N);
+    }
+}
+
 /// Ticks with and without commands, masks and changed rates allocate nothing.
 #[test]
 fn ticks_of_controllers_allocate_nothing() {

@@ -325,9 +325,11 @@ impl Controllers {
 
     fn publish_statuses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let working = self.working.bind(py);
-        let in_use = |_| PyValueError::new_err("working: the array is in use, or no longer writable");
-        let mut array = working.try_readwrite().map_err(in_use)?;
-        let statuses = array.as_array_mut().into_iter().zip(self.inner.statuses());
+        let mut array = working.try_readwrite();
+        let Some(slice) = array.as_mut().ok().and_then(|array| array.as_slice_mut().ok()) else {
+            return Err(PyValueError::new_err("working: the array is in use, or no longer writable"));
+        };
+        let statuses = slice.iter_mut().zip(self.inner.statuses());
         statuses.for_each(|(working, status)| *working = *status == Status::Working);
         Ok(working.clone())
     }

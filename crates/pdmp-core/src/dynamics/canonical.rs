@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 
 use crate::error::Result;
 use crate::kind::Kind;
+use crate::numerics::blocks::Block;
 use crate::numerics::state::{Visitor, visit_number};
 use serde::{Deserialize, Serialize};
 
@@ -81,17 +82,20 @@ impl Canonical {
     }
 }
 
-/// Compensated sums of many movements.
-#[derive(Clone, Debug)]
-pub(crate) struct CompensatedSums {
-    values: Vec<f64>,
-    compensations: Vec<f64>,
+/// Compensated sums of N movements.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CompensatedSums<const N: usize> {
+    values: [f64; N],
+    compensations: [f64; N],
 }
 
-impl CompensatedSums {
-    /// Returns `n` sums of zero.
-    pub(crate) fn zeros(n: usize) -> Self {
-        Self { values: vec![0.0; n], compensations: vec![0.0; n] }
+impl<const N: usize> CompensatedSums<N> {
+    pub(crate) const ZERO: Self = Self { values: [0.0; N], compensations: [0.0; N] };
+
+    /// Returns the sums.
+    #[inline(always)]
+    pub(crate) fn values(&self) -> &[f64; N] {
+        &self.values
     }
 
     /// Returns a sum.
@@ -106,30 +110,31 @@ impl CompensatedSums {
         (self.values[i], self.compensations[i]) = (sum.value, sum.compensation);
     }
 
-    /// Adds a step each to consecutive sums from one on, and returns the sums.
+    /// Adds a step to a sum and returns it.
     #[inline(always)]
-    #[allow(clippy::needless_range_loop)] // The loop over arrays compiles to vector instructions.
-    pub(crate) fn add_each<const N: usize>(&mut self, first: usize, steps: &[f64; N]) -> [f64; N] {
-        let (Some(values), Some(compensations)) =
-            (self.values[first..].first_chunk_mut::<N>(), self.compensations[first..].first_chunk_mut::<N>())
-        else {
-            return [0.0; N];
-        };
-        // Copies: the compiler cannot exclude that the two overlap.
-        let (mut sums, mut rests) = (*values, *compensations);
-        for i in 0..N {
-            let mut sum = CompensatedSum { value: sums[i], compensation: rests[i] };
-            sum.add(steps[i]);
-            (sums[i], rests[i]) = (sum.value, sum.compensation);
-        }
-        (*values, *compensations) = (sums, rests);
-        sums
+    pub(crate) fn add(&mut self, i: usize, step: f64) -> f64 {
+        let mut sum = self.get(i);
+        sum.add(step);
+        self.set(i, sum);
+        sum.value
     }
 
-    /// Returns consecutive sums from one on, `None` beyond the last.
+    /// Wraps an angle to [0, 2π) and returns it.
     #[inline(always)]
-    pub(crate) fn block<const N: usize>(&self, first: usize) -> Option<&[f64; N]> {
-        self.values[first..].first_chunk()
+    pub(crate) fn wrap(&mut self, i: usize) -> f64 {
+        self.values[i] = turn(self.values[i]);
+        self.values[i]
+    }
+
+    /// Adds a step each to the sums from `first` on that fill a register, and returns these.
+    #[inline(always)]
+    pub(crate) fn add_block<B: Block>(&mut self, first: usize, step: B) -> B {
+        let [sums, rests] = [&mut self.values[first..], &mut self.compensations[first..]];
+        let (before, step) = (B::read_all(sums), step + B::read_all(rests));
+        let sum = before + step;
+        sum.write_all(sums);
+        (step - (sum - before)).write_all(rests);
+        sum
     }
 }
 

@@ -1,22 +1,38 @@
 //! Forcing of blocks of groups, for many movements.
 
-use crate::dynamics::forcing_table::{Cubic, ForcingTable, TableIndex, evaluate};
+use crate::dynamics::forcing_table::{Cubic, ForcingTable, evaluate};
 use crate::dynamics::output_system::CubicSample;
 use crate::numerics::blocks::Block;
 
 impl ForcingTable {
+    /// Returns the cells of clocks `u` and the clocks since their first knots, for clocks from 0 to the end.
+    #[inline(always)]
+    pub(crate) fn positions<B: Block>(&self, u: B) -> [B; 2] {
+        let position = u * self.cells_per_clock;
+        let cell = position.floor();
+        [cell, (position - cell) * self.cell_width]
+    }
+
+    /// Returns the cell of clock `u` and the clock since its first knot, as [`ForcingTable::demonstrated_index`] does.
+    #[inline(always)]
+    pub(crate) fn position(&self, u: f64) -> [f64; 2] {
+        let position = u * self.cells_per_clock;
+        let cell = f64::from(position as u32);
+        if cell < self.cells as f64 { [cell, (position - cell) * self.cell_width] } else { [self.cells as f64, 0.0] }
+    }
+
     /// Returns the forcing of a style and its slope as [`ForcingTable::sample`] does, for the block of groups from `group` on. J is
     /// the number of styles, or zero for any number.
     #[inline(always)]
     pub(crate) fn sample_block<B: Block, const J: usize>(
         &self,
-        index: TableIndex,
+        [cell, t]: [f64; 2],
         group: usize,
         style: &[f64],
     ) -> CubicSample<B> {
         // A known number of styles leaves one check of bounds.
         let n_styles = if J == 0 { self.n_styles } else { J };
-        let start = index.first + group * n_styles;
+        let start = cell as u32 as usize * self.knot_stride + group * n_styles;
         let (first, rest) = self.cubics[start..start + B::GROUPS * n_styles].split_at(n_styles);
         let second = if B::GROUPS == 2 { rest } else { first };
         let mut sum = [B::default(); 4];
@@ -34,16 +50,16 @@ impl ForcingTable {
                 j += 1;
             }
         }
-        evaluate(sum, index.t)
+        evaluate(B::in_order(sum), t)
     }
 }
 
 /// Adds a weighted cubic to a sum, or begins the sum with it: a sum with zero would change the sign of zero.
 #[inline(always)]
 fn add<B: Block>(sum: &mut [B; 4], first: &Cubic, second: &Cubic, weight: f64, begins: bool) {
-    let mut i = 0;
+    let (cubic, mut i) = (B::load_four(&first.0, &second.0), 0);
     while i < 4 {
-        let product = B::join(&first.0[i], &second.0[i]) * weight;
+        let product = cubic[i] * weight;
         sum[i] = if begins { product } else { sum[i] + product };
         i += 1;
     }

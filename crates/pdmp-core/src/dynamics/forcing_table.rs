@@ -29,12 +29,12 @@ pub struct ForcingTable {
     pub(super) n_styles: usize,
     n_dofs: usize,
     /// Number of cubics at a knot: one for each group of DoFs and style.
-    knot_stride: usize,
-    cells: usize,
+    pub(super) knot_stride: usize,
+    pub(super) cells: usize,
     /// Width of a cell on the clock.
-    cell_width: f64,
+    pub(super) cell_width: f64,
     /// Number of cells per unit of the clock.
-    cells_per_clock: f64,
+    pub(super) cells_per_clock: f64,
     /// By knots, groups of DoFs and styles, so that a tick reads contiguous memory. After the last knot, a and b of
     /// w = r·(a + b·p) past the end.
     pub(super) cubics: Vec<Cubic>,
@@ -332,19 +332,14 @@ impl ForcingTable {
 
     /// Prefetches the cubics at clock `u`, since a table may exceed the first-level cache.
     #[inline(always)]
-    pub(crate) fn prefetch(&self, u: f64) {
-        self.prefetch_at(self.demonstrated_index(u));
-    }
-
-    /// Prefetches the cubics at a position.
-    #[inline(always)]
     #[allow(unsafe_code)]
-    pub(crate) fn prefetch_at(&self, index: TableIndex) {
+    pub(crate) fn prefetch(&self, u: f64) {
         #[cfg(target_arch = "x86_64")]
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
-            for Cubic([first, _, third, _]) in &self.cubics[index.first..index.first + self.knot_stride] {
+            let first = self.demonstrated_index(u).first;
+            for Cubic([first, _, third, _]) in &self.cubics[first..first + self.knot_stride] {
                 // SAFETY: SSE is part of x86-64, and a prefetch is a hint that never faults and reads no value. The
                 // addresses are those of elements of `cubics`.
                 unsafe {

@@ -58,12 +58,19 @@ fn hermite_dot<T: Real>(weights: &HermiteWeights, [from, to]: [CubicSample<T>; 2
 pub(crate) struct Propagator {
     /// Length of the step on the clock.
     pub(crate) h: f64,
+    /// The part of a goal at rest.
+    pub(crate) resting: RestingPropagator,
+    /// Response of e and z to the goal's displacement γ.
+    pub(crate) goal: [HermiteWeights; 2],
+}
+
+/// Propagator of the output system about a goal at rest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RestingPropagator {
     /// exp(Ah), by rows.
     pub(crate) transition: [[f64; 2]; 2],
     /// Response of e and z to the forcing w.
     pub(crate) forcing: [HermiteWeights; 2],
-    /// Response of e and z to the goal's displacement γ.
-    pub(crate) goal: [HermiteWeights; 2],
 }
 
 impl Attractor {
@@ -109,8 +116,10 @@ impl Attractor {
         let shift = |[a, b]: [f64; 2]| [a * stiffness, b * stiffness];
         Propagator {
             h,
-            transition: [[e_to_e(phi[0]), z_to_e(phi[0])], [e_to_z(phi[0]), z_to_z(phi[0])]],
-            forcing: [hermite_weights(h, phi.map(e_to_e)), hermite_weights(h, phi.map(e_to_z))],
+            resting: RestingPropagator {
+                transition: [[e_to_e(phi[0]), z_to_e(phi[0])], [e_to_z(phi[0]), z_to_z(phi[0])]],
+                forcing: [hermite_weights(h, phi.map(e_to_e)), hermite_weights(h, phi.map(e_to_z))],
+            },
             goal: [hermite_weights(h, phi.map(shift).map(z_to_e)), hermite_weights(h, phi.map(shift).map(z_to_z))],
         }
     }
@@ -185,17 +194,25 @@ impl Propagator {
     /// Returns the state after the step under the forcing w.
     #[inline(always)]
     pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [CubicSample<T>; 2]) -> State<T> {
-        let [[ee, ez], [ze, zz]] = self.transition;
-        State {
-            e: (state.e * ee + state.z * ez) + hermite_dot(&self.forcing[0], forcing),
-            z: (state.e * ze + state.z * zz) + hermite_dot(&self.forcing[1], forcing),
-        }
+        self.resting.advance(state, forcing)
     }
 
     /// Returns the response of the state to the displacement γ of the goal, relative to the goal at the start of the step.
     #[inline(always)]
     pub(crate) fn follow<T: Real>(&self, goal: [CubicSample<T>; 2]) -> State<T> {
         State { e: hermite_dot(&self.goal[0], goal), z: hermite_dot(&self.goal[1], goal) }
+    }
+}
+
+impl RestingPropagator {
+    /// Returns the state after the step under the forcing w.
+    #[inline(always)]
+    pub(crate) fn advance<T: Real>(&self, state: State<T>, forcing: [CubicSample<T>; 2]) -> State<T> {
+        let [[ee, ez], [ze, zz]] = self.transition;
+        State {
+            e: (state.e * ee + state.z * ez) + hermite_dot(&self.forcing[0], forcing),
+            z: (state.e * ze + state.z * zz) + hermite_dot(&self.forcing[1], forcing),
+        }
     }
 }
 
@@ -326,7 +343,7 @@ mod tests {
             let system = Attractor { alpha_z, beta_z: alpha_z * ratio };
             let stiffness = system.alpha_z * system.beta_z;
             let expected = (Matrix2::new(0.0, 1.0, -stiffness, -alpha_z) * h).exp();
-            let found = system.propagator(h).transition;
+            let found = system.propagator(h).resting.transition;
             let size = expected.abs().max() + 1e-3;
             for row in 0..2 {
                 for column in 0..2 {

@@ -10,7 +10,7 @@
 //! with coefficients that depend only on α_z and β_z. A dozen of them suffice for the steps of a control loop, which is
 //! faster than scaling and squaring, and as accurate.
 
-use crate::dynamics::output_system::{Attractor, Propagator};
+use crate::dynamics::output_system::{Attractor, Propagator, RestingPropagator};
 use crate::numerics::simd::{F64x4, Register, WIDTH};
 use crate::numerics::state::clone_in_place;
 
@@ -104,7 +104,8 @@ impl Series {
             *row = (even + odd * h).store().to_array();
         }
         let [forcing_e, forcing_z, goal_e, goal_z, [ee, ez, ze, zz]] = rows;
-        Propagator { h, transition: [[ee, ez], [ze, zz]], forcing: [forcing_e, forcing_z], goal: [goal_e, goal_z] }
+        let resting = RestingPropagator { transition: [[ee, ez], [ze, zz]], forcing: [forcing_e, forcing_z] };
+        Propagator { h, resting, goal: [goal_e, goal_z] }
     }
 }
 
@@ -114,10 +115,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn weights(p: &Propagator) -> Vec<f64> {
-        p.transition
+        p.resting
+            .transition
             .as_flattened()
             .iter()
-            .chain(p.forcing.as_flattened())
+            .chain(p.resting.forcing.as_flattened())
             .chain(p.goal.as_flattened())
             .copied()
             .collect()

@@ -12,8 +12,12 @@
 //! A learnt profile is a uniform cubic B-spline: C², non-decreasing as its coefficients are, and constant to second order
 //! at both ends, where three coefficients are equal.
 
+use std::ops::Mul;
+
 use crate::dynamics::canonical::Canonical;
 use crate::error::{Error, Result};
+use crate::numerics::blocks::Block;
+use crate::numerics::simd::{Real, Register, WIDTH};
 
 /// Minimum number of cells: three coefficients are 0, three are 1, and at least one lies between them.
 pub(crate) const MIN_CELLS: usize = 4;
@@ -46,10 +50,44 @@ pub(crate) struct TransportSegment {
 
 /// Lag ℓ = m − 1 of the frame with its first and second derivative with respect to the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct TransportSample {
-    pub(crate) value: f64,
-    pub(crate) slope: f64,
-    pub(crate) bend: f64,
+pub(crate) struct TransportSample<T = f64> {
+    pub(crate) value: T,
+    pub(crate) slope: T,
+    pub(crate) bend: T,
+}
+
+/// Cells of N clocks, and the clocks at their ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TransportCells<const N: usize> {
+    cell: [u32; N],
+    from: [f64; N],
+    to: [f64; N],
+}
+
+impl<const N: usize> TransportCells<N> {
+    pub(crate) const FIRST: Self = Self { cell: [0; N], from: [0.0; N], to: [f64::INFINITY; N] };
+
+    /// Returns a cell.
+    pub(crate) fn get(&self, i: usize) -> usize {
+        self.cell[i] as usize
+    }
+
+    /// Sets a cell to that of an interval.
+    pub(crate) fn set(&mut self, i: usize, segment: &TransportSegment, transport: &Transport) {
+        // A profile has far fewer cells.
+        self.cell[i] = transport.cell(segment) as u32;
+        (self.from[i], self.to[i]) = (segment.from, segment.to);
+    }
+}
+
+impl<B: Block> TransportSample<B> {
+    /// Writes the lanes to arrays of values, slopes and bends from `first` on.
+    #[inline(always)]
+    fn write_all<const N: usize>(self, [values, slopes, bends]: &mut [&mut [f64; N]; 3], first: usize) {
+        self.value.write_all(&mut values[first..]);
+        self.slope.write_all(&mut slopes[first..]);
+        self.bend.write_all(&mut bends[first..]);
+    }
 }
 
 impl Transport {
@@ -134,37 +172,46 @@ impl Transport {
         }
     }
 
-    /// Returns the lags ℓ at clocks `u` with their derivatives, each of which has not passed its cell or has passed on from it to
-    /// another, which the cell then is.
+    /// Computes the lags ℓ at clocks `u` and their derivatives. Each clock is in its cell, or has passed on from it to another,
+    /// which the cell then is.
     #[inline(always)]
-    #[allow(clippy::needless_range_loop)] // See `Kernel`.
-    pub(crate) fn lags_from<const N: usize>(&self, cells: &mut [u16; N], u: &[f64; N]) -> [[f64; N]; 3] {
-        let (mut lags, common) = ([[0.0; N]; 3], cells[0]);
-        let [from, to] = [0, 1].map(|k| self.width * f64::from(common + k));
-        let mut is_common = true;
-        for i in 0..N {
-            is_common &= (cells[i] == common) & (u[i] < to);
-        }
-        if let Some(cubic) = self.cubics.get(usize::from(common)).filter(|_| is_common) {
-            for i in 0..N {
-                let TransportSample { value, slope, bend } = sample(cubic, u[i] - from);
-                (lags[0][i], lags[1][i], lags[2][i]) = (value, slope, bend);
+    pub(crate) fn lags_from<B: Block, const N: usize>(
+        &self,
+        cells: &mut TransportCells<N>,
+        u: &[f64; N],
+        mut lags: [&mut [f64; N]; 3],
+    ) {
+        for first in (0..N).step_by(WIDTH) {
+            let (now, to) = (B::Group::read_all(&u[first..]), B::Group::read_all(&cells.to[first..]));
+            if to.simd_le(now).to_bitmask() != 0 {
+                for (i, &u) in u.iter().enumerate().skip(first).take(WIDTH) {
+                    if u >= cells.to[i] {
+                        cells.set(i, &self.segment_at(u), self);
+                    }
+                }
             }
-            return lags;
         }
-        for i in 0..N {
-            let at = usize::from(cells[i]);
-            let Some(cubic) = self.cubics.get(at) else { continue };
-            let TransportSample { value, slope, bend } = if u[i] < self.width * (at + 1) as f64 {
-                sample(cubic, u[i] - self.width * at as f64)
-            } else {
-                let segment = self.segment_at(u[i]);
-                cells[i] = self.cell(&segment) as u16;
-                segment.lag(u[i])
-            };
-            (lags[0][i], lags[1][i], lags[2][i]) = (value, slope, bend);
+        let cubic = |cell: u32| self.cubics.get(cell as usize).unwrap_or(&[0.0; 4]);
+        if cells.cell == [cells.cell[0]; N] {
+            let &[value, slope, square, cube] = cubic(cells.cell[0]);
+            let (cubic, from) =
+                ([B::splat(value), B::splat(slope), B::splat(square), B::splat(cube)], B::splat(cells.from[0]));
+            for first in (0..N).step_by(B::LANES) {
+                sample(&cubic, B::read_all(&u[first..]) - from).write_all(&mut lags, first);
+            }
+        } else {
+            for (first, cell) in (0..N).step_by(WIDTH).zip(cells.cell.as_chunks().0) {
+                let &[a, b, c, d]: &[u32; WIDTH] = cell;
+                let cubic = B::Group::transpose([
+                    B::Group::load_numbers(cubic(a)),
+                    B::Group::load_numbers(cubic(b)),
+                    B::Group::load_numbers(cubic(c)),
+                    B::Group::load_numbers(cubic(d)),
+                ]);
+                let t = B::Group::read_all(&u[first..]) - B::Group::read_all(&cells.from[first..]);
+                sample(&cubic, t).write_all(&mut lags, first);
+            }
         }
-        lags
     }
 
     /// Returns the lag ℓ at clock `u`.
@@ -194,13 +241,13 @@ impl TransportSegment {
 
 /// Evaluates a cubic and its derivatives.
 #[inline(always)]
-fn sample([value, slope, square, cube]: &[f64; 4], t: f64) -> TransportSample {
+fn sample<T: Real + Mul<Output = T>>(&[value, slope, square, cube]: &[T; 4], t: T) -> TransportSample<T> {
     let rest = cube * t;
     let bend = square + rest;
     let twice = bend + bend;
     TransportSample {
         value: value + t * (slope + t * bend),
         slope: slope + t * (twice + rest),
-        bend: twice + 4.0 * rest,
+        bend: twice + rest * 4.0f64,
     }
 }

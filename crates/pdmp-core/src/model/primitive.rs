@@ -369,7 +369,7 @@ fn from_rest(attractor: Attractor, forcing_table: &ForcingTable) -> Vec<State<F6
 /// Returns the states of the limit cycle at φ = 0 for unit styles: (I − exp(2πA))⁻¹ times the response of one cycle from
 /// zero.
 fn steady_cycle(attractor: Attractor, forcing_table: &ForcingTable, n_outputs: usize) -> Vec<State<F64x4>> {
-    let [[a, b], [c, d]] = attractor.propagator(TAU).transition;
+    let [[a, b], [c, d]] = attractor.propagator(TAU).resting.transition;
     // All eigenvalues of exp(2πA) lie inside the unit circle, so that the determinant is positive.
     let scale = 1.0 / ((1.0 - a) * (1.0 - d) - b * c);
     let solve =

@@ -8,13 +8,14 @@
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::{
-    __m256d, __m512d, _CMP_LE_OQ, _CMP_LT_OQ, _mm_cvtsd_f64, _mm_min_pd, _mm_min_sd, _mm_unpackhi_pd, _mm256_add_pd,
-    _mm256_and_pd, _mm256_andnot_pd, _mm256_castpd256_pd128, _mm256_cmp_pd, _mm256_div_pd, _mm256_extractf128_pd,
-    _mm256_load_pd, _mm256_loadu_pd, _mm256_max_pd, _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd,
-    _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_store_pd, _mm256_storeu_pd,
-    _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd, _mm256_xor_pd, _mm512_add_pd, _mm512_castpd256_pd512,
-    _mm512_castpd512_pd256, _mm512_extractf64x4_pd, _mm512_insertf64x4, _mm512_load_pd, _mm512_mul_pd, _mm512_set1_pd,
-    _mm512_setzero_pd, _mm512_store_pd, _mm512_storeu_pd, _mm512_sub_pd,
+    __m256d, __m512d, _CMP_LE_OQ, _CMP_LT_OQ, _MM_FROUND_NO_EXC, _MM_FROUND_TO_NEG_INF, _mm_cvtsd_f64, _mm_min_pd,
+    _mm_min_sd, _mm_unpackhi_pd, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd, _mm256_castpd256_pd128, _mm256_cmp_pd,
+    _mm256_div_pd, _mm256_extractf128_pd, _mm256_floor_pd, _mm256_load_pd, _mm256_loadu_pd, _mm256_max_pd,
+    _mm256_min_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_setzero_pd,
+    _mm256_sqrt_pd, _mm256_store_pd, _mm256_storeu_pd, _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
+    _mm256_xor_pd, _mm512_add_pd, _mm512_castpd512_pd256, _mm512_extractf64x4_pd, _mm512_load_pd, _mm512_loadu_pd,
+    _mm512_mul_pd, _mm512_roundscale_pd, _mm512_set1_pd, _mm512_setzero_pd, _mm512_shuffle_f64x2, _mm512_store_pd,
+    _mm512_storeu_pd, _mm512_sub_pd,
 };
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
@@ -80,6 +81,14 @@ impl Default for Avx2 {
 
 blocks_of_one_group!(Avx2);
 
+impl Avx2 {
+    #[inline(always)]
+    fn floor(self) -> Self {
+        // SAFETY: see `default`.
+        Self(unsafe { _mm256_floor_pd(self.0) })
+    }
+}
+
 /// Register of eight DoFs, which only [`compute_pairs`] instantiates.
 #[derive(Clone, Copy)]
 struct Avx512(__m512d);
@@ -105,6 +114,8 @@ impl Mul<f64> for Avx512 {
 impl Real for Avx512 {}
 
 impl Block for Avx512 {
+    type Group = Avx2;
+
     const GROUPS: usize = 2;
 
     #[inline(always)]
@@ -120,10 +131,31 @@ impl Block for Avx512 {
     }
 
     #[inline(always)]
-    fn join(first: &F64x4, second: &F64x4) -> Self {
-        let (first, second): (Avx2, Avx2) = (Register::load(first), Register::load(second));
+    fn load_four(first: &[F64x4; 4], second: &[F64x4; 4]) -> [Self; 4] {
+        let (first, second): (*const f64, *const f64) =
+            (std::ptr::from_ref(first).cast(), std::ptr::from_ref(second).cast());
+        // SAFETY: see `default`. The references make sixteen doubles each readable, and they need no alignment.
+        unsafe {
+            [
+                Self(_mm512_loadu_pd(first)),
+                Self(_mm512_loadu_pd(first.add(8))),
+                Self(_mm512_loadu_pd(second)),
+                Self(_mm512_loadu_pd(second.add(8))),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn in_order([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         // SAFETY: see `default`.
-        Self(unsafe { _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(first.0), second.0) })
+        unsafe {
+            [
+                Self(_mm512_shuffle_f64x2::<0x44>(a.0, c.0)),
+                Self(_mm512_shuffle_f64x2::<0xee>(a.0, c.0)),
+                Self(_mm512_shuffle_f64x2::<0x44>(b.0, d.0)),
+                Self(_mm512_shuffle_f64x2::<0xee>(b.0, d.0)),
+            ]
+        }
     }
 
     #[inline(always)]
@@ -144,6 +176,21 @@ impl Block for Avx512 {
         } else {
             unpad(Register::store(first), numbers);
         }
+    }
+
+    #[inline(always)]
+    fn read_all(numbers: &[f64]) -> Self {
+        match numbers.first_chunk::<8>() {
+            // SAFETY: see `default`. The reference makes eight doubles readable, and they need no alignment.
+            Some(eight) => Self(unsafe { _mm512_loadu_pd(eight.as_ptr()) }),
+            None => Self::default(),
+        }
+    }
+
+    #[inline(always)]
+    fn floor(self) -> Self {
+        // SAFETY: see `default`.
+        Self(unsafe { _mm512_roundscale_pd::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(self.0) })
     }
 
     #[inline(always)]
@@ -174,6 +221,7 @@ operators! {
     Avx512:
     Add add _mm512_add_pd,
     Sub sub _mm512_sub_pd,
+    Mul mul _mm512_mul_pd,
 }
 
 operators! {

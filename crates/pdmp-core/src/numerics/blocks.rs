@@ -1,6 +1,8 @@
 //! Registers of one or two groups of DoFs, for loops over many movements.
 
-use crate::numerics::simd::{F64x4, Real};
+use std::ops::Mul;
+
+use crate::numerics::simd::{F64x4, Real, Register, WIDTH};
 
 /// Two groups in one line of the cache.
 #[derive(Clone, Copy, Debug, Default)]
@@ -8,20 +10,31 @@ use crate::numerics::simd::{F64x4, Real};
 pub(crate) struct Line(pub(crate) [F64x4; 2]);
 
 /// Register of consecutive groups.
-pub(crate) trait Block: Real {
+pub(crate) trait Block: Real + Mul<Output = Self> {
+    /// Register of one group.
+    type Group: Block + Register;
+
     /// Number of groups, one or two.
     const GROUPS: usize;
+    /// Number of lanes.
+    const LANES: usize = Self::GROUPS * WIDTH;
 
     /// Loads one of the groups of a line, or both if there are two.
     fn load(line: &Line, group: usize) -> Self;
     /// Writes one of the groups of a line, or both.
     fn store(self, line: &mut Line, group: usize);
-    /// Loads a group, and another if there are two.
-    fn join(first: &F64x4, second: &F64x4) -> Self;
+    /// Loads four numbers of each lane of a group, and those of another if there are two, in an order for sums.
+    fn load_four(first: &[F64x4; 4], second: &[F64x4; 4]) -> [Self; 4];
+    /// Returns the four numbers of all lanes from what `load_four` loads, or from sums of it.
+    fn in_order(four: [Self; 4]) -> [Self; 4];
     /// Returns a register with the same value in all lanes.
     fn splat(value: f64) -> Self;
     /// Writes the lanes to a slice of that length or less.
     fn write(self, numbers: &mut [f64]);
+    /// Returns the first numbers of a slice, zero if there are fewer than lanes.
+    fn read_all(numbers: &[f64]) -> Self;
+    /// Returns the largest integers that are not larger than the lanes.
+    fn floor(self) -> Self;
     /// Writes all lanes to the first numbers of a slice.
     fn write_all(self, numbers: &mut [f64]);
 }
@@ -30,6 +43,8 @@ pub(crate) trait Block: Real {
 macro_rules! blocks_of_one_group {
     ($register:ty) => {
         impl $crate::numerics::blocks::Block for $register {
+            type Group = Self;
+
             const GROUPS: usize = 1;
 
             #[inline(always)]
@@ -43,8 +58,16 @@ macro_rules! blocks_of_one_group {
             }
 
             #[inline(always)]
-            fn join(first: &$crate::numerics::simd::F64x4, _: &$crate::numerics::simd::F64x4) -> Self {
-                $crate::numerics::simd::Register::load(first)
+            fn load_four(
+                [a, b, c, d]: &[$crate::numerics::simd::F64x4; 4],
+                _: &[$crate::numerics::simd::F64x4; 4],
+            ) -> [Self; 4] {
+                $crate::numerics::simd::Register::load_all([a, b, c, d])
+            }
+
+            #[inline(always)]
+            fn in_order(four: [Self; 4]) -> [Self; 4] {
+                four
             }
 
             #[inline(always)]
@@ -55,6 +78,19 @@ macro_rules! blocks_of_one_group {
             #[inline(always)]
             fn write(self, numbers: &mut [f64]) {
                 $crate::numerics::simd::unpad($crate::numerics::simd::Register::store(self), numbers);
+            }
+
+            #[inline(always)]
+            fn read_all(numbers: &[f64]) -> Self {
+                match numbers.first_chunk() {
+                    Some(four) => $crate::numerics::simd::Register::load_numbers(four),
+                    None => Self::default(),
+                }
+            }
+
+            #[inline(always)]
+            fn floor(self) -> Self {
+                self.floor()
             }
 
             #[inline(always)]

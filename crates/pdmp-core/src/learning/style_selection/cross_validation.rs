@@ -45,7 +45,7 @@ impl<'a> StyleSelection<'a> {
     ) -> Self {
         let kind = canonical.kind();
         let n_samples = kind.samples(STEPS);
-        let step = attractor.propagator(canonical.extent() / STEPS as f64).transition;
+        let step = attractor.propagator(canonical.extent() / STEPS as f64).resting.transition;
         let next = |State { e, z }| State { e: step[0][0] * e + step[0][1] * z, z: step[1][0] * e + step[1][1] * z };
         let decay = std::iter::successors(Some(State { e: 1.0, z: 0.0 }), |state| Some(next(*state)));
         let start: Array1<f64> = match kind {

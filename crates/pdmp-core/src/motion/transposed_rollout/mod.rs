@@ -16,7 +16,7 @@ mod schedule;
 
 use crate::dynamics::forcing_table::TableIndex;
 use crate::dynamics::forcing_transpose::add_sample;
-use crate::dynamics::output_system::{Attractor, Propagator, State};
+use crate::dynamics::output_system::{Attractor, RestingPropagator, State};
 use crate::dynamics::transport::TransportSample;
 use crate::error::Result;
 use crate::model::conditions::Conditions;
@@ -120,7 +120,7 @@ impl Sums {
     ///
     /// q(u_end) = −e and q′(u_end) = τẏ_g − z − w for the state that would arrive.
     fn arrive(&mut self, primitive: &Primitive) {
-        let [[ee, ez], [ze, zz]] = primitive.attractor().propagator(primitive.canonical().extent()).transition;
+        let [[ee, ez], [ze, zz]] = primitive.attractor().propagator(primitive.canonical().extent()).resting.transition;
         for (index, group) in self.groups.iter_mut().enumerate() {
             let [value, slope] = group.transition;
             let (e, z) = (-(value + group.end[0]), -(slope + group.end[1]));
@@ -237,8 +237,8 @@ impl Backward<'_> {
     fn step_back<T: Register>(&mut self, propagator: usize, to: &Point) {
         let Self { primitive, schedule, sums, .. } = self;
         sums.enter::<T>(primitive, to.index);
-        let Propagator { transition: [[ee, ez], [ze, zz]], forcing: [by_e, by_z], .. } =
-            &schedule.propagators[propagator];
+        let RestingPropagator { transition: [[ee, ez], [ze, zz]], forcing: [by_e, by_z] } =
+            &schedule.propagators[propagator].resting;
         for index in 0..sums.groups.len() {
             let group = &mut sums.groups[index];
             let [e, z] = T::load_all([&group.state[0], &group.state[1]]);

@@ -1,170 +1,115 @@
-//! Clocks of steady movements over a substep, and their places in the tables.
+//! Clocks of steady movements over a substep, and their positions in the tables.
 
 use super::super::substeps::ROUNDING;
-use super::SteadyMovements;
-use super::tick::Steps;
+use super::{BLOCK, SteadyBlock};
 use crate::dynamics::canonical::{Canonical, amplitude};
-use crate::dynamics::forcing_table::TableIndex;
+use crate::model::primitive::Primitive;
+use crate::numerics::blocks::Block;
 
-/// Number of movements in a block: their cubics (0.8 kB each at D = 7 and J = 3) fit into the first-level cache.
-pub(super) const BLOCK: usize = 16;
-
-/// Clocks of the movements of a block over a substep.
-pub(super) struct Substeps {
-    pub(super) place: [usize; BLOCK],
-    pub(super) propagator: [u32; BLOCK],
-    pub(super) index: [TableIndex; BLOCK],
-    pub(super) rate: [f64; BLOCK],
-    /// Amplitudes r and r′.
-    pub(super) r: [[f64; BLOCK]; 2],
-    /// Lags ℓ of the frame at both ends, and ℓ′ and ℓ″ at the end.
-    pub(super) lags: [[f64; BLOCK]; 2],
+/// Substep of the movements of a block.
+pub(super) struct Substep {
+    /// True for a movement that takes the substep.
+    pub(super) is_active: [bool; BLOCK],
+    /// Cell of the forcing table at the end, and the clock since its first knot.
+    pub(super) cell: [f64; BLOCK],
+    pub(super) t: [f64; BLOCK],
+    /// Amplitude r′ at the end.
+    pub(super) amplitude_slope: [f64; BLOCK],
+    /// Lag ℓ of the frame at the begin, and ℓ′ and ℓ″ at the end.
+    pub(super) lag: [f64; BLOCK],
     pub(super) frame_slopes: [[f64; BLOCK]; 2],
 }
 
-impl Default for Substeps {
-    fn default() -> Self {
-        Self {
-            place: [0; BLOCK],
-            propagator: [0; BLOCK],
-            index: [TableIndex::default(); BLOCK],
-            rate: [0.0; BLOCK],
-            r: [[1.0; BLOCK], [0.0; BLOCK]],
-            lags: [[0.0; BLOCK]; 2],
-            frame_slopes: [[0.0; BLOCK]; 2],
-        }
-    }
+impl Substep {
+    pub(super) const EMPTY: Self = Self {
+        is_active: [false; BLOCK],
+        cell: [0.0; BLOCK],
+        t: [0.0; BLOCK],
+        amplitude_slope: [0.0; BLOCK],
+        lag: [0.0; BLOCK],
+        frame_slopes: [[0.0; BLOCK]; 2],
+    };
 }
 
-impl Steps<'_, '_> {
-    /// Advances the clocks of a whole block if all its movements are steady, of this tick, before their end and take one
-    /// substep. Returns false if not, and then changes nothing.
+// Blocks that move as a whole are advanced in registers: loops over arrays are no vector instructions in the wheel, of which the
+// last pass optimises for size.
+#[allow(clippy::needless_range_loop)] // See `Kernel`.
+impl SteadyBlock {
+    /// Begins a tick of the movements that are steady, of this tick and before their end. Returns their numbers of substeps, zero
+    /// for the others, and adds those at their end to `ending`. The block begins with place `first`.
     #[inline(always)]
-    #[allow(clippy::needless_range_loop)] // See `Kernel`.
-    pub(super) fn begin_all<const RHYTHMIC: bool>(&mut self, first: usize, substeps: &mut Substeps) -> bool {
-        let Self { movements: SteadyMovements { clocks, .. }, primitive, mask, tick, .. } = self;
-        let (Some(counts), Some(&steps), Some(present)) = (
-            clocks.n_substeps[first..].first_chunk::<BLOCK>(),
-            clocks.h[first..].first_chunk::<BLOCK>(),
-            clocks.clock.block::<BLOCK>(first),
-        ) else {
-            return false;
-        };
-        let mut is_one = true;
+    pub(super) fn begin<B: Block>(
+        &mut self,
+        first: usize,
+        canonical: Canonical,
+        dt: f64,
+        mask: Option<&[bool]>,
+        ending: &mut Vec<u32>,
+    ) -> [u32; BLOCK] {
+        let u_end = if let Canonical::Discrete { u_end, .. } = canonical { u_end } else { f64::INFINITY };
+        let (mut remaining, mut is_ending) = (self.n_substeps, [false; BLOCK]);
+        if let Some(mask) = mask {
+            for (remaining, is_selected) in remaining.iter_mut().zip(&mask[first..]) {
+                *remaining *= u32::from(*is_selected);
+            }
+        }
         for i in 0..BLOCK {
-            is_one &= counts[i] == 1;
+            let (n, u) = (remaining[i], self.clock.get(i).value());
+            is_ending[i] = (n > 0) & (u_end - u <= f64::from(n) * self.h[i] * (1.0 + ROUNDING));
         }
-        if let Some(mask) = mask.and_then(|mask| mask[first..].first_chunk::<BLOCK>()) {
-            for i in 0..BLOCK {
-                is_one &= mask[i];
+        if is_ending != [false; BLOCK] {
+            for i in (0..BLOCK).filter(|i| is_ending[*i]) {
+                remaining[i] = 0;
+                ending.push((first + i) as u32);
             }
         }
-        if let Canonical::Discrete { u_end, .. } = primitive.canonical() {
-            for i in 0..BLOCK {
-                is_one &= u_end - present[i] > steps[i] * (1.0 + ROUNDING);
+        if remaining == [1; BLOCK] {
+            for i in (0..BLOCK).step_by(B::LANES) {
+                self.time.add_block(i, B::splat(dt));
+            }
+        } else {
+            for i in (0..BLOCK).filter(|i| remaining[*i] > 0) {
+                self.time.add(i, dt);
             }
         }
-        if is_one {
-            clocks.time.add_each(first, &[tick.dt; BLOCK]);
-            let ahead = clocks.clock.add_each(first, &steps);
-            self.locate::<RHYTHMIC, BLOCK>(first, ahead, 0, substeps);
-        }
-        is_one
+        remaining
     }
 
-    /// Advances the times of the movements of a block that are steady, of this tick and before their end, and writes their
-    /// numbers of substeps to `remaining`, zero for the others.
-    pub(super) fn begin_some(&mut self, first: usize, remaining: &mut [u16; BLOCK]) {
-        *remaining = [0; BLOCK];
-        let clocks = &mut self.movements.clocks;
-        for (i, place) in (first..clocks.n_substeps.len().min(first + BLOCK)).enumerate() {
-            let n_substeps = clocks.n_substeps[place];
-            if n_substeps == 0 || self.mask.is_some_and(|mask| !mask[place]) {
-                continue;
-            }
-            if let Canonical::Discrete { u_end, .. } = self.primitive.canonical()
-                && u_end - clocks.clock.get(place).value() <= f64::from(n_substeps) * clocks.h[place] * (1.0 + ROUNDING)
-            {
-                self.ending.push(place as u32);
-                continue;
-            }
-            clocks.time.add_each(place, &[self.tick.dt]);
-            remaining[i] = n_substeps;
-        }
-    }
-
-    /// Advances the clocks of the movements of a block with remaining substeps by one. Returns the number of these movements.
+    /// Advances the clocks of the movements with remaining substeps by one of these.
     #[inline(always)]
-    pub(super) fn begin_next<const RHYTHMIC: bool>(
+    pub(super) fn advance<B: Block, const RHYTHMIC: bool>(
         &mut self,
-        first: usize,
-        remaining: &mut [u16; BLOCK],
-        substeps: &mut Substeps,
-    ) -> usize {
-        let mut n = 0;
-        for (i, remaining) in remaining.iter_mut().enumerate() {
-            if *remaining > 0 {
-                *remaining -= 1;
-                let clocks = &mut self.movements.clocks;
-                let ahead = clocks.clock.add_each(first + i, &[clocks.h[first + i]]);
-                self.locate::<RHYTHMIC, 1>(first + i, ahead, n, substeps);
-                n += 1;
-            }
-        }
-        n
-    }
-
-    /// Finds the places of N consecutive movements in the tables at clocks `u`, to which their clocks have advanced.
-    #[inline(always)]
-    #[allow(clippy::needless_range_loop)] // See `Kernel`.
-    fn locate<const RHYTHMIC: bool, const N: usize>(
-        &mut self,
-        first: usize,
-        mut u: [f64; N],
-        at: usize,
-        to: &mut Substeps,
+        remaining: &mut [u32; BLOCK],
+        primitive: &Primitive,
+        substep: &mut Substep,
     ) {
-        let Self { movements: SteadyMovements { clocks, amplitudes, .. }, primitive, last, .. } = self;
-        if RHYTHMIC && let Canonical::Rhythmic { mu } = primitive.canonical() {
-            for i in 0..N {
-                let mut clock = clocks.clock.get(first + i);
-                clock.wrap();
-                clocks.clock.set(first + i, clock);
-                u[i] = clock.value();
-                let [value, target] = &mut amplitudes[first + i];
-                *value = amplitude(mu, *value, *target, clocks.h[first + i]);
-                (to.r[0][at + i], to.r[1][at + i]) = (*value, mu * (*target - *value));
+        let (table, canonical) = (primitive.forcing_table(), primitive.canonical());
+        substep.lag = self.lag;
+        if !RHYTHMIC && *remaining == [1; BLOCK] {
+            (substep.is_active, *remaining) = ([true; BLOCK], [0; BLOCK]);
+            for i in (0..BLOCK).step_by(B::LANES) {
+                let [cell, t] = table.positions(self.clock.add_block(i, B::read_all(&self.h[i..])));
+                cell.write_all(&mut substep.cell[i..]);
+                t.write_all(&mut substep.t[i..]);
+            }
+        } else {
+            for i in 0..BLOCK {
+                substep.is_active[i] = remaining[i] > 0;
+                if !substep.is_active[i] {
+                    continue;
+                }
+                remaining[i] -= 1;
+                let mut u = self.clock.add(i, self.h[i]);
+                if RHYTHMIC && let Canonical::Rhythmic { mu } = canonical {
+                    u = self.clock.wrap(i);
+                    let [r, target] = [self.amplitude[0][i], self.amplitude[1][i]];
+                    self.amplitude[0][i] = amplitude(mu, r, target, self.h[i]);
+                    substep.amplitude_slope[i] = mu * (target - self.amplitude[0][i]);
+                }
+                [substep.cell[i], substep.t[i]] = table.position(u);
             }
         }
-        let (Some(cells), Some(lags), Some(rates), Some(propagators)) = (
-            clocks.cell[first..].first_chunk_mut::<N>(),
-            clocks.lag[first..].first_chunk_mut::<N>(),
-            clocks.rate[first..].first_chunk::<N>(),
-            clocks.propagator[first..].first_chunk::<N>(),
-        ) else {
-            return;
-        };
-        let [values, slopes, bends] = primitive.transport.lags_from(cells, &u);
-        for i in 0..N {
-            to.place[at + i] = first + i;
-            to.propagator[at + i] = propagators[i];
-            to.rate[at + i] = rates[i];
-            to.lags[0][at + i] = lags[i];
-            to.lags[1][at + i] = values[i];
-            lags[i] = values[i];
-            to.frame_slopes[0][at + i] = slopes[i];
-            to.frame_slopes[1][at + i] = bends[i];
-        }
-        let table = primitive.forcing_table();
-        for i in 0..N {
-            to.index[at + i] = table.demonstrated_index(u[i]);
-        }
-        for i in 0..N {
-            let index = to.index[at + i];
-            if !index.is_in_cell_of(*last) {
-                table.prefetch_at(index);
-            }
-            *last = index;
-        }
+        let [slopes, bends] = &mut substep.frame_slopes;
+        primitive.transport.lags_from::<B, BLOCK>(&mut self.cells, self.clock.values(), [&mut self.lag, slopes, bends]);
     }
 }
