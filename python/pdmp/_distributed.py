@@ -186,8 +186,8 @@ class _Tasks:
     def submit(self, function: Callable[..., Any], *arguments: Any, priority: int = 0) -> Any:
         """Submits a task. Equal tasks of different fits are different, as one may be cancelled.
 
-        Blocks are read in their order and merged at once: of the partial fits, each of at most 16·N²
-        bytes, the cluster then has some for each worker and one for each level of the tree.
+        Blocks are read in their order and merged at once: of the partial fits, each of at most
+        16·N² bytes, the cluster then has some for each worker and one for each level of the tree.
         """
         future = self.client.submit(function, *arguments, pure=False, priority=priority)
         self.submitted.append(weakref.ref(future))
