@@ -273,7 +273,7 @@ def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
         (["fit", "{folder}", "--smoothing", "-3", "-o", "m"], "--smoothing = -3: must be positive"),
         (["fit", "{folder}", "--period", "1", "-o", "m"], "--period does not apply to a discrete"),
         (["fit", "{folder}", "--max-gap", "-1", "-o", "m"], "--max-gap = -1: must not be negative"),
-        (["info", "{index}"], "model file"),
+        (["info", "{index}"], "usable file"),
     ],
 )
 def test_errors_are_one_line_and_exit_with_1(
