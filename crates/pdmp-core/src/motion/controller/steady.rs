@@ -33,6 +33,8 @@ struct SteadyBlock {
     rate: [f64; BLOCK],
     /// Clock interval of a substep.
     h: [f64; BLOCK],
+    /// Clock from which on a tick would reach the end.
+    last: [f64; BLOCK],
     /// Lag ℓ of the frame at the clock.
     lag: [f64; BLOCK],
     /// Amplitudes r, and their commands r₀.
@@ -90,12 +92,7 @@ impl Controller {
     /// Returns whether the next tick is a steady one.
     pub(in crate::motion) fn is_steady(&self) -> bool {
         let rate = first_element(self.rate.value());
-        let (h, n_substeps) = (rate * self.dt, self.steady_substeps());
-        let before_end = match self.primitive.canonical() {
-            Canonical::Discrete { u_end, .. } => u_end - self.clock.value() > h * (1.0 + ROUNDING),
-            Canonical::Rhythmic { .. } => true,
-        };
-        before_end
+        self.clock.value() < self.last_steady_clock()
             && self.started
             && self.status == Status::Working
             && self.pose.is_none()
@@ -110,8 +107,16 @@ impl Controller {
             && self.perturbation.terms().is_none()
             && self.perturbation.phase_rate() == 1.0
             && self.forcing_phase_rate == 1.0
-            && h > 0.0
-            && self.propagator.step() == rate * (self.dt / n_substeps)
+            && rate * self.dt > 0.0
+            && self.propagator.step() == rate * (self.dt / self.steady_substeps())
+    }
+
+    /// Returns the clock from which on a steady tick would reach the end.
+    fn last_steady_clock(&self) -> f64 {
+        match self.primitive.canonical() {
+            Canonical::Discrete { u_end, .. } => u_end - first_element(self.rate.value()) * self.dt * (1.0 + ROUNDING),
+            Canonical::Rhythmic { .. } => f64::INFINITY,
+        }
     }
 
     /// Returns the number of substeps of a tick while no command is in transition.
@@ -145,6 +150,7 @@ impl SteadyMovements {
             clock: CompensatedSums::ZERO,
             rate: numbers,
             h: numbers,
+            last: numbers,
             lag: numbers,
             amplitude: [numbers; 2],
             cells: TransportCells::FIRST,
@@ -184,6 +190,7 @@ impl SteadyMovements {
         block.lag[i] = controller.frame_lag;
         (block.amplitude[0][i], block.amplitude[1][i]) = (controller.r, first_element(controller.amplitude.value()));
         block.cells.set(i, &controller.transport_segment, &controller.primitive.transport);
+        block.last[i] = controller.last_steady_clock();
         // A tick has far fewer substeps.
         block.n_substeps[i] = controller.steady_substeps() as u32;
         block.propagators[i] = controller.propagator.resting;

@@ -1,10 +1,10 @@
 //! Clocks of steady movements over a substep, and their positions in the tables.
 
-use super::super::substeps::ROUNDING;
 use super::{BLOCK, SteadyBlock};
 use crate::dynamics::canonical::{Canonical, amplitude};
 use crate::model::primitive::Primitive;
 use crate::numerics::blocks::Block;
+use crate::numerics::simd::{Register, WIDTH};
 
 /// Substep of the movements of a block.
 pub(super) struct Substep {
@@ -41,26 +41,25 @@ impl SteadyBlock {
     pub(super) fn begin<B: Block>(
         &mut self,
         first: usize,
-        canonical: Canonical,
         dt: f64,
         mask: Option<&[bool]>,
         ending: &mut Vec<u32>,
     ) -> [u32; BLOCK] {
-        let u_end = if let Canonical::Discrete { u_end, .. } = canonical { u_end } else { f64::INFINITY };
-        let (mut remaining, mut is_ending) = (self.n_substeps, [false; BLOCK]);
+        let mut remaining = self.n_substeps;
         if let Some(mask) = mask {
             for (remaining, is_selected) in remaining.iter_mut().zip(&mask[first..]) {
                 *remaining *= u32::from(*is_selected);
             }
         }
-        for i in 0..BLOCK {
-            let (n, u) = (remaining[i], self.clock.get(i).value());
-            is_ending[i] = (n > 0) & (u_end - u <= f64::from(n) * self.h[i] * (1.0 + ROUNDING));
-        }
-        if is_ending != [false; BLOCK] {
-            for i in (0..BLOCK).filter(|i| is_ending[*i]) {
-                remaining[i] = 0;
-                ending.push((first + i) as u32);
+        for start in (0..BLOCK).step_by(WIDTH) {
+            let (u, last) =
+                (B::Group::read_all(&self.clock.values()[start..]), B::Group::read_all(&self.last[start..]));
+            if last.simd_le(u).to_bitmask() != 0 {
+                for i in (start..start + WIDTH).filter(|i| self.clock.get(*i).value() >= self.last[*i]) {
+                    if std::mem::take(&mut remaining[i]) > 0 {
+                        ending.push((first + i) as u32);
+                    }
+                }
             }
         }
         if remaining == [1; BLOCK] {

@@ -55,7 +55,7 @@ impl Steps<'_, '_> {
         let (mut substep, mut forcing) = (Substep::EMPTY, [CubicSample::<B>::default(); BLOCK]);
         for (index, (block, (pairs, styles))) in blocks.iter_mut().zip(vectors).enumerate() {
             let first = index * BLOCK;
-            let mut remaining = block.begin::<B>(first, primitive.canonical(), dt, self.mask, self.ending);
+            let mut remaining = block.begin::<B>(first, dt, self.mask, self.ending);
             while remaining != [0; BLOCK] {
                 block.advance::<B, RHYTHMIC>(&mut remaining, primitive, &mut substep);
                 for group in (0..*n_groups).step_by(B::GROUPS) {
