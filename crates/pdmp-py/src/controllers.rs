@@ -329,8 +329,13 @@ impl Controllers {
         let Some(slice) = array.as_mut().ok().and_then(|array| array.as_slice_mut().ok()) else {
             return Err(PyValueError::new_err("working: the array is in use, or no longer writable"));
         };
-        let statuses = slice.iter_mut().zip(self.inner.statuses());
-        statuses.for_each(|(working, status)| *working = *status == Status::Working);
+        if self.inner.n_steady() == self.inner.len() {
+            // A steady movement is working.
+            slice.fill(true);
+        } else {
+            let statuses = slice.iter_mut().zip(self.inner.statuses());
+            statuses.for_each(|(working, status)| *working = *status == Status::Working);
+        }
         Ok(working.clone())
     }
 }
