@@ -329,6 +329,7 @@ impl FactorisedFit {
 
 /// Returns the error of a pass with other blocks.
 pub(super) fn different_blocks() -> Error {
-    let problem = "differ between the passes: a function of no arguments must return the same blocks at every call";
+    let problem = "differ between the passes: pass those of the first one in the same order; a function returns them at each \
+                   call";
     Error::Argument { name: "blocks", problem }
 }
