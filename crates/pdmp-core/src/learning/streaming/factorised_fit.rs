@@ -74,8 +74,7 @@ impl PartialFit {
             _ => Transport::immediate(),
         };
         // Styles beyond the rank of the targets are of rows of zeros.
-        let min_rows =
-            if let NStyles::Truncated(Truncation::Rank(n)) = options.n_styles { n.clamp(1, n_demos) } else { 1 };
+        let min_rows = if let NStyles::Truncated(Truncation::Rank(n)) = options.n_styles { n.max(1) } else { 1 };
         let rows = self.factor.matrix(min_rows);
         let targets = self.compressed_targets(&rows, &transport, &dof_scale);
         let contexts = self.summaries.tabulated();

@@ -73,10 +73,10 @@ impl RowFactor {
         self.triangle.has_finite_elements()
     }
 
-    /// Returns R, with rows of zeros after the others if they are fewer than `min_rows`.
+    /// Returns R, with rows of zeros after the others if they are fewer than `min_rows`, of which N suffice.
     pub(super) fn matrix(&self, min_rows: usize) -> Array2<f64> {
         let rank = self.triangle.n_columns();
-        let mut matrix = Array2::zeros((rank.max(min_rows), self.n_columns));
+        let mut matrix = Array2::zeros((rank.max(min_rows.min(self.n_columns)), self.n_columns));
         let mut rows = matrix.slice_mut(s![..rank, ..]);
         let triangle = self.triangle.matrix();
         match &self.span {
@@ -306,6 +306,7 @@ mod tests {
         }
         let one = factor(&few, 2000, Threads::ONE);
         assert_eq!(one.matrix(20).slice(s![7.., ..]), Array2::<f64>::zeros((13, N)));
+        assert_eq!(one.matrix(usize::MAX).nrows(), N);
         assert_eq!(one.matrix(0), factor(&few, 2000, Threads::new(2).unwrap()).matrix(0));
         let (span, elements) = one.parts();
         assert_eq!(RowFactor::from_parts(N, span.cloned(), &elements).matrix(0), one.matrix(0));
