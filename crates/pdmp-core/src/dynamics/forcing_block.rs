@@ -13,14 +13,6 @@ impl ForcingTable {
         [cell, (position - cell) * self.cell_width]
     }
 
-    /// Returns the cell of clock `u` and the clock since its first knot, as [`ForcingTable::demonstrated_index`] does.
-    #[inline(always)]
-    pub(crate) fn position(&self, u: f64) -> [f64; 2] {
-        let position = u * self.cells_per_clock;
-        let cell = f64::from(position as u32);
-        if cell < self.cells as f64 { [cell, (position - cell) * self.cell_width] } else { [self.cells as f64, 0.0] }
-    }
-
     /// Returns the forcing of a style and its slope as [`ForcingTable::sample`] does, for the block of groups from `group` on. J is
     /// the number of styles, or zero for any number.
     #[inline(always)]

@@ -30,7 +30,7 @@ pub struct ForcingTable {
     n_dofs: usize,
     /// Number of cubics at a knot: one for each group of DoFs and style.
     pub(super) knot_stride: usize,
-    pub(super) cells: usize,
+    cells: usize,
     /// Width of a cell on the clock.
     pub(super) cell_width: f64,
     /// Number of cells per unit of the clock.
@@ -320,13 +320,20 @@ impl ForcingTable {
     #[inline(always)]
     pub(crate) fn demonstrated_index(&self, u: f64) -> TableIndex {
         let u = if let Canonical::Rhythmic { .. } = self.canonical { turn(u) } else { u };
+        let (cell, t) = self.position(u);
+        TableIndex { first: cell as usize * self.knot_stride, t }
+    }
+
+    /// Returns the cell of clock `u`, of a rhythmic movement below 2π, and the clock since its first knot.
+    #[inline(always)]
+    pub(crate) fn position(&self, u: f64) -> (u32, f64) {
         let position = u * self.cells_per_clock;
         // The cast saturates: a negative clock is evaluated in the first cell.
         let cell = position as u32;
         if cell < self.cells as u32 {
-            TableIndex { first: cell as usize * self.knot_stride, t: (position - f64::from(cell)) * self.cell_width }
+            (cell, (position - f64::from(cell)) * self.cell_width)
         } else {
-            TableIndex { first: self.cells * self.knot_stride, t: 0.0 }
+            (self.cells as u32, 0.0)
         }
     }
 

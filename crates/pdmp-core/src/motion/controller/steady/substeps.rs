@@ -105,7 +105,8 @@ impl SteadyBlock {
                     self.amplitude[0][i] = amplitude(mu, r, target, self.h[i]);
                     substep.amplitude_slope[i] = mu * (target - self.amplitude[0][i]);
                 }
-                [substep.cell[i], substep.t[i]] = table.position(u);
+                let (cell, t) = table.position(u);
+                (substep.cell[i], substep.t[i]) = (f64::from(cell), t);
             }
         }
         let [slopes, bends] = &mut substep.frame_slopes;
